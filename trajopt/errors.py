@@ -1,0 +1,66 @@
+"""Errors a user can meet. Each carries the offending value and says what would be right."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class TrajoptError(Exception):
+    """Base of every error that trajopt raises on purpose."""
+
+
+class ArgumentError(TrajoptError, ValueError):
+    """A call got a value it cannot use.
+
+    ``argument`` names it, ``value`` is what came, ``expected`` says what would be right.
+    """
+
+    def __init__(self, argument: str, value: Any, expected: str) -> None:
+        self.argument, self.value, self.expected = argument, value, expected
+        super().__init__(f"{argument} = {_short(value)}: expected {expected}")
+
+
+class ProblemError(TrajoptError, ValueError):
+    """A problem file holds something wrong.
+
+    ``file``, ``key`` and ``value`` say where, ``expected`` what would be right.
+    """
+
+    def __init__(self, file: str, key: str, value: Any, expected: str) -> None:
+        self.file, self.key, self.value, self.expected = file, key, value, expected
+        super().__init__(f"{file}: {key} = {_short(value)}: expected {expected}")
+
+
+class InfeasibleError(TrajoptError):
+    """No motion satisfies the limits.
+
+    ``limit`` names the limit that cannot be met, ``place`` the path parameter (same unit as the
+    gridpoints) where it fails first.
+    """
+
+    def __init__(self, limit: str, place: float, reason: str) -> None:
+        self.limit, self.place, self.reason = limit, place, reason
+        super().__init__(f"infeasible: limit '{limit}' at s = {place:.4g}: {reason}")
+
+
+class MissingDependencyError(TrajoptError, ImportError):
+    """An optional package is not installed. ``extra`` is the pip extra that brings it."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        self.package, self.extra, self.purpose = package, extra, purpose
+        super().__init__(
+            f"{purpose} needs the package '{package}', which is not installed: "
+            f"pip install 'trajopt[{extra}]' (pybullet has wheels up to CPython 3.11)"
+            if package == "pybullet"
+            else f"{purpose} needs the package '{package}', which is not installed: "
+            f"pip install 'trajopt[{extra}]'"
+        )
+
+
+class SimulationError(TrajoptError):
+    """A physics engine could not run the scene, or its result is not a motion (NaN, explosion)."""
+
+
+def _short(value: Any, limit: int = 120) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,0 +1,168 @@
+"""A path: control points, a heading rule, and the path parameter that time scaling works on.
+
+Two parameters appear. ``u`` is the spline parameter (knots). ``s`` is the path parameter: arc length where
+the robot drives along its heading, and the integral of sqrt(dx^2 + dy^2 + (L dpsi)^2) where it can turn on
+the spot (L = ``turning_length``), so that a pure turn has a length too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.paths.spline import SplineBasis, chord_length_knots
+
+Array = NDArray[np.float64]
+
+_CELLS_PER_SEGMENT = 64  # quadrature cells a spline segment: length error below 1e-12 on smooth paths
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
+
+
+@dataclass(frozen=True)
+class Path:
+    """Cubic spline path. Build it with ``Path.through`` or from a basis and control values.
+
+    ``coordinates`` (size, 2 or 3): control values of x, y(, z), m. ``heading`` (size,): control values of the
+    yaw angle (rad) for robots that choose it, None where yaw is the direction of travel.
+    ``turning_length`` (m) is used only with a heading.
+    """
+
+    basis: SplineBasis
+    coordinates: Array
+    heading: Array | None = None
+    turning_length: float = 1.0
+
+    def __post_init__(self) -> None:
+        shape = np.shape(self.coordinates)
+        if len(shape) != 2 or shape[0] != self.basis.size or shape[1] not in (2, 3):
+            raise ArgumentError("coordinates", shape, f"shape ({self.basis.size}, 2) or ({self.basis.size}, 3)")
+        for name, values in (("coordinates", self.coordinates), ("heading", self.heading)):
+            if values is not None and not np.all(np.isfinite(values)):
+                raise ArgumentError(name, np.asarray(values).tolist(), "finite numbers")
+        if self.heading is not None and np.shape(self.heading) != (self.basis.size,):
+            raise ArgumentError("heading", np.shape(self.heading), f"shape ({self.basis.size},)")
+        if not self.turning_length > 0:
+            raise ArgumentError("turning_length", self.turning_length, "a length > 0 m")
+
+    @classmethod
+    def through(cls, points: ArrayLike, *, heading: ArrayLike | None = None, knots: ArrayLike | None = None,
+                start_direction: ArrayLike | None = None, end_direction: ArrayLike | None = None,
+                turning_length: float = 1.0) -> Path:
+        """Spline through ``points`` (N, 2) or (N, 3), m; ``heading`` (N,), rad, or None for the tangent's.
+
+        ``knots`` (N,) default to chord lengths. ``start_direction`` and ``end_direction`` (2 or 3 numbers)
+        are the first derivatives with respect to the knots' parameter; without them the ends are natural.
+        Raises ArgumentError for fewer than two points, coinciding neighbours, or numbers that are not finite.
+        """
+        array = np.asarray(points, dtype=np.float64)
+        if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] not in (2, 3):
+            raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
+        if not np.all(np.isfinite(array)):
+            raise ArgumentError("points", array.tolist(), "finite numbers")
+        given = chord_length_knots(array) if knots is None else tuple(np.asarray(knots, dtype=float).tolist())
+        if len(given) != len(array):
+            raise ArgumentError("knots", len(given), f"one knot a point ({len(array)})")
+        basis = SplineBasis(given, start_direction is not None, end_direction is not None)
+        ends = [np.asarray(d, dtype=np.float64) for d in (start_direction, end_direction) if d is not None]
+        for end in ends:
+            if end.shape != (array.shape[1],):
+                raise ArgumentError("direction", end.tolist(), f"{array.shape[1]} numbers")
+        coordinates = np.vstack([array, *ends]) if ends else array
+        yaw = None
+        if heading is not None:
+            yaw = np.asarray(heading, dtype=np.float64)
+            if yaw.shape != (len(array),):
+                raise ArgumentError("heading", yaw.shape, f"one angle a point, shape ({len(array)},)")
+            span = (yaw[-1] - yaw[0]) / (given[-1] - given[0])  # ends turn at the mean rate, if clamped
+            yaw = np.concatenate([yaw, np.full(len(ends), span)])
+        return cls(basis, coordinates, yaw, turning_length)
+
+    @property
+    def points(self) -> Array:
+        """(K, 2 or 3): the control points, without end derivatives."""
+        return self.coordinates[: len(self.basis.knots)]
+
+    @property
+    def start(self) -> float:
+        """First spline parameter."""
+        return self.basis.knots[0]
+
+    @property
+    def end(self) -> float:
+        """Last spline parameter."""
+        return self.basis.knots[-1]
+
+    def position(self, u: ArrayLike, derivative: int = 0) -> Array:
+        """(N, 3): x, y, z (m) or their derivative with respect to u, at spline parameters (N,)."""
+        value = self.basis.matrix(np.asarray(u, dtype=np.float64), derivative) @ self.coordinates
+        return value if value.shape[1] == 3 else np.column_stack([value, np.zeros(len(value))])
+
+    def yaw(self, u: ArrayLike, derivative: int = 0) -> Array:
+        """(N,): heading angle, rad, or its derivative with respect to u (order 0..3; 0 or 1 for tangents).
+
+        With tangent heading, the angle is continuous along increasing ``u``.
+        """
+        if self.heading is not None:
+            return self.basis.matrix(np.asarray(u, dtype=np.float64), derivative) @ self.heading
+        d = self.position(u, 1)
+        if derivative == 0:
+            return np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
+        if derivative != 1:
+            raise ArgumentError("derivative", derivative, "0 or 1 where yaw is the direction of travel")
+        dd = self.position(u, 2)
+        return np.asarray((d[:, 0] * dd[:, 1] - d[:, 1] * dd[:, 0]) / (d[:, 0] ** 2 + d[:, 1] ** 2))
+
+    def rate(self, u: ArrayLike) -> Array:
+        """(N,): ds/du, the speed of the path parameter along the spline parameter."""
+        squares = np.sum(self.position(u, 1) ** 2, axis=1)
+        if self.heading is not None:
+            squares = squares + (self.turning_length * self.yaw(u, 1)) ** 2
+        return np.asarray(np.sqrt(squares))
+
+    @cached_property
+    def _table(self) -> tuple[Array, Array]:
+        """Spline parameters of the quadrature cells and the path parameter there."""
+        cells = [np.linspace(a, b, _CELLS_PER_SEGMENT, endpoint=False)
+                 for a, b in zip(self.basis.knots[:-1], self.basis.knots[1:], strict=True)]
+        u = np.concatenate([*cells, [self.end]])
+        lengths = self._integrate(u[:-1], u[1:])
+        return u, np.concatenate([[0.0], np.cumsum(lengths)])
+
+    def _integrate(self, a: Array, b: Array) -> Array:
+        """Path parameter gained from a to b (each inside one quadrature cell)."""
+        half = (b - a) / 2
+        nodes = (a + b)[:, None] / 2 + half[:, None] * _GAUSS_X
+        return np.asarray((self.rate(nodes.ravel()).reshape(nodes.shape) @ _GAUSS_W) * half)
+
+    @property
+    def length(self) -> float:
+        """Total path parameter: arc length (m), or the mixed length where heading is free."""
+        return float(self._table[1][-1])
+
+    @cached_property
+    def knot_parameters(self) -> Array:
+        """(K,): path parameter s at the knots."""
+        return self.parameter(np.asarray(self.basis.knots))
+
+    def parameter(self, u: ArrayLike) -> Array:
+        """(N,): path parameter s at spline parameters u."""
+        grid, s = self._table
+        u = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        i = np.clip(np.searchsorted(grid, u, side="right") - 1, 0, len(grid) - 2)
+        return np.asarray(s[i] + self._integrate(grid[i], u))
+
+    def locate(self, s: ArrayLike) -> Array:
+        """(N,): spline parameter u at path parameters s in [0, length]; Newton on the arc length."""
+        grid, table = self._table
+        s = np.clip(np.atleast_1d(np.asarray(s, dtype=np.float64)), 0.0, self.length)
+        u = np.interp(s, table, grid)
+        i = np.clip(np.searchsorted(table, s, side="right") - 1, 0, len(grid) - 2)
+        for _ in range(4):
+            residual = table[i] + self._integrate(grid[i], u) - s
+            rate = self.rate(u)
+            u = np.clip(u - residual / np.where(rate > 0, rate, np.inf), grid[i], grid[i + 1])
+        return np.asarray(u)

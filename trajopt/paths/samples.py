@@ -1,0 +1,114 @@
+"""A path seen by the limits: geometry at gridpoints, with derivatives along the path parameter s.
+
+With path speed s' and path acceleration s'', everything a limit needs is linear in (s'', s'^2):
+
+    body twist           (vx, vy, wz) = twist s'
+    its time derivative               = twist s'' + twist_rate s'^2
+    acceleration, body frame          = (twist_x, twist_y, 0) s'' + acceleration_rate s'^2
+
+On a slope the body frame is tangent to the surface: x along the heading, z along the surface normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import InfeasibleError
+from trajopt.paths.path import Path
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PathSamples:
+    """Geometry at N gridpoints. SI units; the body frame is x forward, y left, z up (surface normal)."""
+
+    s: Array  # (N,) path parameter, m
+    u: Array  # (N,) spline parameter
+    position: Array  # (N, 3) x, y, z, m
+    yaw: Array  # (N,) rad, continuous
+    tangent: Array  # (N, 3) d position / ds
+    twist: Array  # (N, 3) body twist per unit path speed: (vx, vy, wz)
+    twist_rate: Array  # (N, 3) d twist / ds
+    acceleration_rate: Array  # (N, 3) body-frame acceleration per s'^2
+    gravity: Array  # (N, 3) direction of gravity in the body frame (unit vector)
+    curvature: Array  # (N,) geodesic curvature of the track, 1/m (0 where the robot turns on the spot)
+    slope: Array  # (N,) rad, positive uphill along the direction of travel
+
+
+def sample_path(path: Path, s: Array) -> PathSamples:
+    """Samples of ``path`` at path parameters ``s`` (N,) in [0, path.length].
+
+    Raises InfeasibleError where the path stands still or doubles back (no direction of travel there).
+    """
+    u = path.locate(s)
+    p = [path.position(u, k) for k in range(4)]
+    if path.heading is None:
+        return _along_tangent(s, u, p)
+    yaw = [path.yaw(u, k) for k in range(4)]
+    return _free_heading(s, u, p, yaw, path.turning_length)
+
+
+def _by_path_parameter(s: Array, c1: Array, c2: Array, c3: Array) -> tuple[Array, Array, Array]:
+    """First to third derivative along s of coordinates whose derivatives along u are c1, c2, c3 (N, D)."""
+    g = np.sqrt(np.sum(c1**2, axis=1))
+    scale = float(np.max(g)) if len(g) else 0.0
+    if not scale > 0 or np.any(g < 1e-9 * scale):
+        place = float(s[int(np.argmin(g))]) if len(g) else 0.0
+        raise InfeasibleError("path", place, "the path stands still or doubles back here; move or drop a "
+                                             "control point, or split the path at the stop")
+    g = g[:, None]
+    g1 = np.sum(c1 * c2, axis=1)[:, None] / g
+    g2 = (np.sum(c2 * c2 + c1 * c3, axis=1)[:, None] - g1**2) / g
+    first = c1 / g
+    second = c2 / g**2 - c1 * g1 / g**3
+    third = c3 / g**3 - 3 * c2 * g1 / g**4 - c1 * g2 / g**4 + 3 * c1 * g1**2 / g**5
+    return first, second, third
+
+
+def _along_tangent(s: Array, u: Array, p: list[Array]) -> PathSamples:
+    """Heading along the path: twist (1, 0, geodesic curvature). The lateral axis stays level."""
+    t, t1, t2 = _by_path_parameter(s, p[1], p[2], p[3])
+    level = np.hypot(t[:, 0], t[:, 1])
+    if np.any(level < 1e-6):
+        raise InfeasibleError("path", float(s[int(np.argmin(level))]), "the path is vertical here")
+    cross = t[:, 0] * t1[:, 1] - t[:, 1] * t1[:, 0]
+    cross1 = t[:, 0] * t2[:, 1] - t[:, 1] * t2[:, 0]
+    level1 = (t[:, 0] * t1[:, 0] + t[:, 1] * t1[:, 1]) / level
+    kappa = cross / level
+    kappa1 = cross1 / level - cross * level1 / level**2
+    # Surface normal = tangent x (level lateral axis); vertical curvature is the curvature along it.
+    kappa_v = t1[:, 2] * level - t[:, 2] * level1
+    zero, one = np.zeros_like(kappa), np.ones_like(kappa)
+    yaw = np.unwrap(np.arctan2(t[:, 1], t[:, 0]))
+    return PathSamples(
+        s, u, p[0], yaw, t,
+        np.column_stack([one, zero, kappa]), np.column_stack([zero, zero, kappa1]),
+        np.column_stack([zero, kappa, kappa_v]),
+        np.column_stack([-t[:, 2], zero, -level]), kappa, np.arcsin(np.clip(t[:, 2], -1.0, 1.0)),
+    )
+
+
+def _free_heading(s: Array, u: Array, p: list[Array], yaw: list[Array], length: float) -> PathSamples:
+    """Heading of its own, on level ground: the planar motion of an omnidirectional robot."""
+    stacked = [np.column_stack([p[k][:, :2], length * yaw[k]]) for k in range(4)]
+    d1, d2, _ = _by_path_parameter(s, stacked[1], stacked[2], stacked[3])
+    cos, sin = np.cos(yaw[0]), np.sin(yaw[0])
+    w, w1 = d1[:, 2] / length, d2[:, 2] / length
+    vx, vy = cos * d1[:, 0] + sin * d1[:, 1], -sin * d1[:, 0] + cos * d1[:, 1]
+    ax, ay = cos * d2[:, 0] + sin * d2[:, 1], -sin * d2[:, 0] + cos * d2[:, 1]
+    zero, one = np.zeros_like(w), np.ones_like(w)
+    speed = np.hypot(d1[:, 0], d1[:, 1])
+    cross = d1[:, 0] * d2[:, 1] - d1[:, 1] * d2[:, 0]
+    moving = speed > 1e-6  # slower than 1e-6 of the path parameter it is a turn on the spot
+    curvature = np.where(moving, cross / np.where(moving, speed, 1.0) ** 3, 0.0)
+    tangent = np.column_stack([d1[:, 0], d1[:, 1], zero])
+    # d/ds of R(-yaw) d1 = R(-yaw) d2 - w (e_z x R(-yaw) d1)
+    return PathSamples(
+        s, u, p[0], yaw[0], tangent,
+        np.column_stack([vx, vy, w]), np.column_stack([ax + w * vy, ay - w * vx, w1]),
+        np.column_stack([ax, ay, zero]), np.column_stack([zero, zero, -one]), curvature, zero,
+    )
