@@ -1,0 +1,280 @@
+"""Terminal cost of a spline motion: final pose and final wheel angles (thesis 000, Table 4.4).
+
+    S = gains . |pose error| + wheel_gain * sum over critical wheels of |folded wheel deviation|
+
+The wheel deviation is the circular distance modulo the period, folded to [0, period/2]; with the period
+2 pi and the gains of Table 5.8 this recomputes Tables 5.5 and 5.6.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
+from trajopt.objectives.exact import exact_terminal
+from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
+from trajopt.paths.path import Path
+from trajopt.paths.spline import SplineBasis, uniform_basis
+from trajopt.problem import Problem
+from trajopt.robots.actuator import Actuator
+from trajopt.robots.catalogue import robot_named
+from trajopt.robots.platform import Platform
+
+Array = NDArray[np.float64]
+
+SEARCH_STEPS = 252  # 84 steps a spline segment, 14 to 20 ms on the problems at hand; chosen
+HEADING_MARGIN = np.pi / 2  # rad beyond start and goal heading for free heading control points, chosen
+DURATION_RANGE = (0.25, 4.0)  # times the nominal duration, for a free duration, chosen
+
+
+@dataclass(frozen=True)
+class ControlPoints:
+    """Control values of n candidates in columns: x, y, yaw (4, n) and duration (1, n) in s."""
+
+    x: Any
+    y: Any
+    yaw: Any
+    duration: Any
+
+
+@dataclass(frozen=True)
+class TerminalObjective:
+    """Table 4.4 over the free control values of ``problem``.
+
+    Decision variables, in this order where free: x1, y1 (p1), x2, y2 (p2), yaw1, yaw2 (heading), duration.
+    """
+
+    problem: Problem
+    robot: Platform
+    steps: int = SEARCH_STEPS
+    kinematics: Kinematics | None = None  # None: the robot's own; given only to compare conventions
+
+    @property
+    def basis(self) -> SplineBasis:
+        return uniform_basis(4)
+
+    @cached_property
+    def model(self) -> Kinematics:
+        return self.kinematics or Kinematics(self.robot.inverse, self.robot.forward)
+
+    @cached_property
+    def actuator(self) -> Actuator:
+        section = self.problem.actuator
+        return Actuator(section.saturation, section.dead_zone) if section.enabled else Actuator()
+
+    @property
+    def is_affine(self) -> bool:
+        """Whether the critical wheel angles are affine in the decision variables (modulo the period)."""
+        return self.actuator.is_ideal and set(self.problem.spline.free) <= {"p1", "p2"}
+
+    @property
+    def provides(self) -> frozenset[Capability]:
+        always = {Capability.BATCH, Capability.RESIDUALS, Capability.SYMBOLIC}
+        return frozenset(always | ({Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set()))
+
+    # -- decision variables ---------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the decision variables with their units."""
+        parts = {"p1": ("p1.x_m", "p1.y_m"), "p2": ("p2.x_m", "p2.y_m"),
+                 "heading": ("p1.yaw_rad", "p2.yaw_rad"), "duration": ("duration_s",)}
+        return tuple(name for key in parts if key in self.problem.spline.free for name in parts[key])
+
+    @property
+    def dimension(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def bounds(self) -> Array:
+        """(d, 2): the navigation space for points; margins around start and goal for heading; duration."""
+        p = self.problem
+        yaws = (p.start.pose[2], p.goal.pose[2])
+        heading = (min(yaws) - HEADING_MARGIN, max(yaws) + HEADING_MARGIN)
+        by_suffix = {"x_m": p.space.x, "y_m": p.space.y, "yaw_rad": heading,
+                     "duration_s": tuple(f * p.spline.duration for f in DURATION_RANGE)}
+        return np.array([by_suffix[name.split(".")[-1]] for name in self.names], dtype=np.float64)
+
+    @cached_property
+    def default(self) -> Array:
+        """(d,): the thesis's P1 (Table 5.4, kept inside the space), P2 on the far third, linear heading."""
+        p1, p2, yaw = self._fixed_points
+        values = {"p1.x_m": p1[0], "p1.y_m": p1[1], "p2.x_m": p2[0], "p2.y_m": p2[1],
+                  "p1.yaw_rad": yaw[0], "p2.yaw_rad": yaw[1], "duration_s": self.problem.spline.duration}
+        return np.clip([values[name] for name in self.names], self.bounds[:, 0], self.bounds[:, 1])
+
+    @property
+    def _fixed_points(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        (x0, y0, a0), (xf, yf, af) = self.problem.start.pose, self.problem.goal.pose
+        p1 = (x0 + (xf - x0) / 2.5, y0 + (yf - y0) / 3)  # Table 5.4 with x_min = x_0, x_max = x_f
+        p2 = (x0 + (xf - x0) * 2 / 3, y0 + (yf - y0) * 2 / 3)
+        return p1, p2, (a0 + (af - a0) / 3, a0 + (af - a0) * 2 / 3)
+
+    def control_points(self, z: Any) -> ControlPoints:
+        """Control values from decision variables ``z`` (d, n): arrays or symbols, candidates in columns."""
+        free, column = self.problem.spline.free, 0 * z[0:1]
+        rows = dict(zip(self.names, (z[i : i + 1] for i in range(self.dimension)), strict=True))
+        (x0, y0, a0), (xf, yf, af) = self.problem.start.pose, self.problem.goal.pose
+        p1, p2, yaw = self._fixed_points
+        x1, y1 = (rows["p1.x_m"], rows["p1.y_m"]) if "p1" in free else (column + p1[0], column + p1[1])
+        x2, y2 = (rows["p2.x_m"], rows["p2.y_m"]) if "p2" in free else (column + p2[0], column + p2[1])
+        a1, a2 = column + yaw[0], column + yaw[1]
+        if "heading" in free:
+            a1, a2 = rows["p1.yaw_rad"], rows["p2.yaw_rad"]
+        duration = rows["duration_s"] if "duration" in free else column + self.problem.spline.duration
+        return ControlPoints(
+            np.vstack([column + x0, x1, x2, column + xf]), np.vstack([column + y0, y1, y2, column + yf]),
+            np.vstack([column + a0, a1, a2, column + af]), duration)
+
+    def path(self, candidate: Array) -> Path:
+        """The path through the control points of one candidate (d,)."""
+        points = self.control_points(np.asarray(candidate, dtype=np.float64)[:, None])
+        return Path(self.basis, np.column_stack([points.x[:, 0], points.y[:, 0]]), points.yaw[:, 0],
+                    self.robot.turning_length)
+
+    # -- cost -----------------------------------------------------------------------------------------
+
+    def predict(self, z: Any) -> Terminal:
+        """Final state on the search grid, for decision variables (d, n)."""
+        points = self.control_points(z)
+        grid = step_grid(self.basis, self.steps)
+        return roll_out(grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration)
+
+    def predict_exactly(self, candidate: Array) -> Terminal:
+        """Final state of one candidate (d,), free of grid error."""
+        points = self.control_points(np.asarray(candidate, dtype=np.float64)[:, None])
+        return exact_terminal(self.basis, self.model, self.actuator, points.x[:, 0], points.y[:, 0],
+                              points.yaw[:, 0], float(points.duration[0, 0]))
+
+    def wheel_errors(self, final: Terminal) -> list[Any]:
+        """Critical wheel angle minus wanted angle, unfolded, rad, one entry a critical wheel."""
+        start, goal = self.problem.start.wheels, self.problem.goal
+        return [final.wheels[i] + (start[i] - goal.wheels[i]) for i in goal.critical_indices]
+
+    def pose_errors(self, final: Terminal) -> tuple[Any, Any, Any]:
+        """Final minus wanted x, y (m), yaw (rad)."""
+        x, y, yaw = self.problem.goal.pose
+        return final.x - x, final.y - y, final.yaw - yaw
+
+    def named_terms(self, final: Terminal) -> dict[str, Any]:
+        """The terms of Table 4.4 by name; they sum to the cost."""
+        section = self.problem.objective
+        terms = {name: gain * np.abs(error) for name, gain, error in
+                 zip(("x", "y", "yaw"), section.pose_gains, self.pose_errors(final), strict=True)}
+        for name, error in zip(self.problem.goal.critical, self.wheel_errors(final), strict=True):
+            terms[f"wheel {name}"] = section.wheel_gain * np.abs(folded(error, section.period))
+        return terms
+
+    def evaluate(self, candidates: Array) -> Evaluation:
+        terms = self.named_terms(self.predict(np.asarray(candidates, dtype=np.float64).T))
+        cost = np.sum([np.broadcast_to(t, (1, len(candidates)))[0] for t in terms.values()], axis=0)
+        return Evaluation(cost, np.zeros(len(candidates)))
+
+    def terms(self, candidate: Array) -> dict[str, float]:
+        """Named cost terms of one candidate (d,), without grid error."""
+        return {k: float(np.squeeze(v)) for k, v in self.named_terms(self.predict_exactly(candidate)).items()}
+
+    def score(self, candidate: Array) -> Evaluation:
+        return Evaluation(np.array([sum(self.terms(candidate).values())]), np.zeros(1))
+
+    # -- residuals ------------------------------------------------------------------------------------
+
+    def nearest_turns(self, candidates: Array) -> Array:
+        """(n, c): for each critical wheel, the whole number of periods nearest to the predicted angle."""
+        errors = self.wheel_errors(self.predict(np.asarray(candidates, dtype=np.float64).T))
+        return np.stack([np.round(np.asarray(e)[0] / self.problem.objective.period) for e in errors], axis=1)
+
+    def residuals(self, z: Any, turns: Any, *, exact: bool = False) -> list[Any]:
+        """Pose errors, then critical wheel errors less ``turns`` (c,) periods; zero at an exact solution.
+
+        ``z`` is (d, n), or (d,) with ``exact``. Without actuator limits pose errors are zero identically and
+        are left out.
+        """
+        final = self.predict_exactly(z) if exact else self.predict(z)
+        period = self.problem.objective.period
+        wheels = [e - period * k for e, k in zip(self.wheel_errors(final), turns, strict=True)]
+        return wheels if self.actuator.is_ideal else [*self.pose_errors(final), *wheels]
+
+    def residual_gains(self) -> Array:
+        """(m,): the cost's gain on the magnitude of each residual."""
+        section = self.problem.objective
+        wheels = [section.wheel_gain] * len(self.problem.goal.critical)
+        return np.array(wheels if self.actuator.is_ideal else [*section.pose_gains, *wheels])
+
+    def affine(self) -> tuple[Array, Array]:
+        """(c, d) matrix M and (c,) offset: critical wheel errors = M z + offset, without actuator limits.
+
+        Exact because a prescribed heading makes every wheel's travel linear in the control points. Raises
+        ArgumentError when heading or duration are free or an actuator is switched on.
+        """
+        if not self.is_affine:
+            raise ArgumentError("spline.free", list(self.problem.spline.free),
+                                "p1 and p2 only, and no actuator, for affine wheel angles")
+        d = self.dimension
+        probes = np.hstack([np.zeros((d, 1)), np.eye(d)])
+        points = self.control_points(probes)
+        travel = wheel_travel(step_grid(self.basis, 48), self.model, points.x, points.y, points.yaw)
+        ends = Terminal(points.x[-1:], points.y[-1:], points.yaw[-1:],
+                        tuple(q.sum(axis=0, keepdims=True) for q in travel))
+        errors = np.vstack([np.asarray(e) for e in self.wheel_errors(ends)])
+        return errors[:, 1:] - errors[:, :1], errors[:, 0]
+
+    def gradient(self, candidate: Array) -> Array:
+        """(d,): gradient of the cost where affine (a subgradient at its kinks)."""
+        matrix, offset = self.affine()
+        deviation = folded(matrix @ candidate + offset, self.problem.objective.period)
+        return np.asarray(self.problem.objective.wheel_gain * np.sign(deviation) @ matrix)
+
+    def symbolic(self, z: Any, start: Array) -> SymbolicProblem:
+        """Table 4.4 as a smooth program, turns fixed to those nearest at ``start`` (d,).
+
+        ``z`` (d + m, 1) holds the decision variables and one slack a residual: minimise gains . slack
+        subject to slack - r >= 0 and slack + r >= 0, so that slack = |r| at the optimum.
+        """
+        turns = self.nearest_turns(start[None])[0]
+        r = self.residuals(z[: self.dimension], turns)
+        slack = [z[self.dimension + i : self.dimension + i + 1] for i in range(len(r))]
+        gains = self.residual_gains()
+        cost: Any = 0.0
+        for gain, value in zip(gains.tolist(), slack, strict=True):
+            cost = cost + gain * value
+        rows = [row for value, error in zip(slack, r, strict=True) for row in (value - error, value + error)]
+        return SymbolicProblem(cost, np.vstack(rows), np.zeros(len(rows)), np.full(len(rows), np.inf))
+
+    def slack_start(self, start: Array) -> Array:
+        """(m,): values of the slacks of ``symbolic`` at a starting point (d,)."""
+        turns = self.nearest_turns(start[None])[0]
+        return np.array([float(np.abs(np.squeeze(v))) for v in self.residuals(start[:, None], turns)])
+
+
+def folded(angle: Any, period: float) -> Any:
+    """Angle modulo ``period``, folded to [-period/2, period/2): the nearest way round."""
+    return angle - period * np.floor(angle / period + 0.5)
+
+
+def terminal_cost(pose_deviation: Array, wheel_deviation: Array, pose_gains: Array, wheel_gains: Array,
+                  period: float = 2 * np.pi) -> float:
+    """Table 4.4 from deviations alone: pose (3,), wheels (4,), with gains (3,) and (4,)."""
+    return float(np.dot(pose_gains, np.abs(pose_deviation))
+                 + np.dot(wheel_gains, np.abs(folded(np.asarray(wheel_deviation), period))))
+
+
+def terminal_objective(problem: Problem, *, steps: int = SEARCH_STEPS) -> TerminalObjective:
+    """The terminal objective of a problem on its own robot."""
+    return TerminalObjective(problem, robot_named(problem.robot.name), steps)
+
+
+def with_free(problem: Problem, *free: str) -> Problem:
+    """The same problem with other free control values."""
+    return problem.replace({"spline.free": list(free)})
+
+
+def on_grid(objective: TerminalObjective, steps: int) -> TerminalObjective:
+    """The same objective on another search grid."""
+    return replace(objective, steps=steps)

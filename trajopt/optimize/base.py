@@ -1,0 +1,288 @@
+"""The contract every optimizer fulfils, and the recorder that enforces it.
+
+An optimizer is a frozen dataclass of options with one method, ``minimize``. It never touches the objective
+itself, only through a ``Run``, which keeps every optimizer to the same bounds, budget and bookkeeping: it
+counts evaluations, keeps the history and the best candidate (Deb's feasibility rule), treats an objective
+that raises or returns NaN as infeasible, and ends the search when the budget is used up.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import ClassVar, NoReturn, Protocol
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.objectives.base import Capability, Evaluation, Objective
+
+Array = NDArray[np.float64]
+
+FEASIBLE = 1e-9  # violation up to which a candidate counts as feasible (rounding), chosen
+DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, thesis 000 Table 5.8
+_KEPT_SAMPLES = 50_000  # explored candidates kept for pictures
+
+
+class Status(Enum):
+    """Why a search ended, and what to do about it."""
+
+    TARGET = "the target was reached"
+    CONVERGED = "the method's own stopping rule was met"
+    EVALUATIONS = "the budget of evaluations is used up; raise Budget.evaluations to search longer"
+    SECONDS = "the budget of seconds is used up; raise Budget.seconds to search longer"
+    INFEASIBLE = "no feasible candidate was found; widen the bounds or free more variables"
+    FAILED = "the objective gave no finite cost anywhere it was asked; check the objective at x0"
+    NO_EXACT = "no exact solution lies inside the bounds; the best feasible one is returned; free more variables"
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a search may use: objective ``evaluations``, wall-clock ``seconds``, and a cost ``target`` that ends it."""
+
+    evaluations: int | None = DEFAULT_EVALUATIONS
+    seconds: float | None = None
+    target: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.evaluations is not None and self.evaluations < 1:
+            raise ArgumentError("budget.evaluations", self.evaluations, "a whole number >= 1, or None")
+        if self.seconds is not None and not self.seconds > 0:
+            raise ArgumentError("budget.seconds", self.seconds, "a time > 0 s, or None")
+        if self.evaluations is None and self.seconds is None:
+            raise ArgumentError("budget", "unlimited", "a limit on evaluations or on seconds")
+
+
+@dataclass(frozen=True)
+class History:
+    """Best so far each time it improved: evaluations used, seconds, cost, violation, each (h,).
+
+    ``samples`` (m, d) are explored candidates in the order of evaluation (the first 50,000).
+    """
+
+    evaluations: NDArray[np.int64]
+    seconds: Array
+    cost: Array
+    violation: Array
+    samples: Array
+
+
+@dataclass(frozen=True)
+class OptimizeResult:
+    """Outcome of a search, in SciPy's names.
+
+    ``fun`` and ``violation`` are recomputed by the objective at ``x`` after the search, more finely than the
+    search saw it where the objective can (``search_fun`` is what the search saw). ``failures`` counts
+    evaluations that raised or were not finite; ``first_failure`` says what the first one was.
+    """
+
+    x: Array
+    fun: float
+    violation: float
+    search_fun: float
+    nfev: int
+    nit: int
+    success: bool
+    status: Status
+    message: str
+    optimizer: str
+    history: History
+    seconds: float
+    failures: int = 0
+    first_failure: str = ""
+
+
+class Optimizer(Protocol):
+    """A search method. ``needs`` lists what it asks of an objective; ``stochastic`` whether seeds matter."""
+
+    name: ClassVar[str]
+    needs: ClassVar[frozenset[Capability]]
+    stochastic: ClassVar[bool]
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget) -> OptimizeResult: ...
+
+
+class _Stop(Exception):  # noqa: N818 - control flow inside a run, never seen by users
+    def __init__(self, status: Status) -> None:
+        self.status = status
+
+
+@dataclass
+class Run:
+    """One search: the only way from an optimizer to its objective. Mutable by nature; lives for one search."""
+
+    objective: Objective
+    bounds: Array
+    budget: Budget
+    nfev: int = 0
+    nit: int = 0
+    failures: int = 0
+    first_failure: str = ""
+    best_x: Array | None = None
+    best_cost: float = np.inf
+    best_violation: float = np.inf
+    on_progress: Callable[[int, float], None] | None = None
+    _rows: list[tuple[int, float, float, float]] = field(default_factory=list)
+    _samples: list[Array] = field(default_factory=list)
+    _kept: int = 0
+    _started: float = field(default_factory=time.perf_counter)
+
+    # -- evaluating -----------------------------------------------------------------------------------
+
+    def evaluate(self, candidates: Array) -> Evaluation:
+        """Cost and violation of candidates (n, d); the distance outside the bounds adds to the violation.
+
+        Ends the search (by an exception the run catches itself) when the budget is used up or the target met.
+        """
+        candidates = np.ascontiguousarray(candidates, dtype=np.float64)
+        wanted = len(candidates)
+        if self.budget.evaluations is not None:
+            candidates = candidates[: self.budget.evaluations - self.nfev]
+        if len(candidates) == 0:
+            self.stop(Status.EVALUATIONS)
+        result = self._guarded(candidates)
+        outside = np.maximum(self.bounds[:, 0] - candidates, candidates - self.bounds[:, 1]).clip(min=0.0)
+        violation = result.violation + outside.sum(axis=1)
+        self._record(candidates, result.cost, violation)
+        if self.budget.target is not None and self.best_violation <= FEASIBLE and self.best_cost <= self.budget.target:
+            self.stop(Status.TARGET)
+        if len(candidates) < wanted:
+            self.stop(Status.EVALUATIONS)
+        if self.budget.seconds is not None and self.elapsed >= self.budget.seconds:
+            self.stop(Status.SECONDS)
+        return Evaluation(result.cost, violation)
+
+    def cost(self, candidate: Array) -> float:
+        """Cost of one candidate (d,)."""
+        return float(self.evaluate(np.asarray(candidate, dtype=np.float64)[None]).cost[0])
+
+    def _guarded(self, candidates: Array) -> Evaluation:
+        """The objective's answer, with everything that is not a finite number turned into "infeasible"."""
+        try:
+            result = self.objective.evaluate(candidates.copy())
+            cost = np.array(result.cost, dtype=np.float64)
+            violation = np.array(result.violation, dtype=np.float64)
+            if cost.shape != (len(candidates),) or violation.shape != cost.shape:
+                raise ValueError(f"objective returned shape {cost.shape} for {len(candidates)} candidates")
+        except (KeyboardInterrupt, SystemExit, _Stop):
+            raise
+        except Exception as error:  # whatever a user's objective raises counts as infeasible
+            if len(candidates) > 1:
+                parts = [self._guarded(row[None]) for row in candidates]
+                return Evaluation(np.concatenate([p.cost for p in parts]),
+                                  np.concatenate([p.violation for p in parts]))
+            return self._failed(np.full(1, np.inf), np.full(1, np.inf), np.ones(1, bool),
+                                f"{type(error).__name__}: {error}")
+        bad = ~(np.isfinite(cost) & np.isfinite(violation))
+        if bad.any():
+            worst = cost[np.argmax(bad)]
+            return self._failed(cost, violation, bad, f"cost {worst} at {candidates[np.argmax(bad)].tolist()}")
+        return Evaluation(cost, violation)
+
+    def _failed(self, cost: Array, violation: Array, bad: NDArray[np.bool_], reason: str) -> Evaluation:
+        self.failures += int(bad.sum())
+        self.first_failure = self.first_failure or reason
+        return Evaluation(np.where(bad, np.inf, cost), np.where(bad, np.inf, violation))
+
+    def _record(self, candidates: Array, cost: Array, violation: Array) -> None:
+        before = self.nfev
+        self.nfev += len(candidates)
+        if self._kept < _KEPT_SAMPLES:
+            part = candidates[: _KEPT_SAMPLES - self._kept]
+            self._samples.append(part)
+            self._kept += len(part)
+        i = best_index(cost, violation)
+        if better(cost[i], violation[i], self.best_cost, self.best_violation):
+            self.best_cost, self.best_violation = float(cost[i]), float(violation[i])
+            self.best_x = candidates[i].copy()
+            self._rows.append((before + i + 1, self.elapsed, self.best_cost, self.best_violation))
+        if self.on_progress is not None:
+            self.on_progress(self.nfev, self.best_cost)
+
+    @property
+    def elapsed(self) -> float:
+        return time.perf_counter() - self._started
+
+    def remaining(self) -> int:
+        """Evaluations left (a large number when unlimited)."""
+        return (2**62 if self.budget.evaluations is None else self.budget.evaluations) - self.nfev
+
+    def stop(self, status: Status) -> NoReturn:
+        """End the search now."""
+        raise _Stop(status)
+
+    # -- finishing ------------------------------------------------------------------------------------
+
+    def finish(self, optimizer: str, search: Callable[[], tuple[Status, str]]) -> OptimizeResult:
+        """Run ``search`` to its end or the budget's, then judge the best candidate anew."""
+        try:
+            status, message = search()
+        except _Stop as stop:
+            status, message = stop.status, ""
+        x = self.best_x
+        if x is None:
+            x = self.bounds.mean(axis=1)
+            status = Status.FAILED
+            fun = violation = np.inf
+        else:
+            x = np.clip(x, self.bounds[:, 0], self.bounds[:, 1])
+            scored = self.objective.score(x)
+            fun, violation = float(scored.cost[0]), float(scored.violation[0])
+        if status is not Status.FAILED and not violation <= FEASIBLE:
+            status = Status.INFEASIBLE
+        text = f"{message}: {status.value}" if message else status.value
+        if self.failures:
+            text += f" ({self.failures} evaluations failed; the first: {self.first_failure})"
+        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 4)
+        history = History(rows[:, 0].astype(np.int64), rows[:, 1], rows[:, 2], rows[:, 3],
+                          np.concatenate(self._samples) if self._samples else np.zeros((0, len(self.bounds))))
+        return OptimizeResult(
+            x, fun, violation, self.best_cost, self.nfev, self.nit, status in (Status.TARGET, Status.CONVERGED),
+            status, text, optimizer, history, self.elapsed, self.failures, self.first_failure)
+
+
+def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:
+    """Deb's feasibility rule: feasible before infeasible, then the cost, or else the violation, decides."""
+    feasible, than_feasible = violation <= FEASIBLE, than_violation <= FEASIBLE
+    if feasible and than_feasible:
+        return bool(cost < than_cost)
+    if feasible or than_feasible:
+        return bool(feasible)
+    return bool(violation < than_violation or (violation == than_violation and cost < than_cost))
+
+
+def best_index(cost: Array, violation: Array) -> int:
+    """Index of the best candidate under Deb's rule."""
+    feasible = violation <= FEASIBLE
+    if feasible.any():
+        return int(np.argmin(np.where(feasible, cost, np.inf)))
+    return int(np.argmin(violation))
+
+
+def checked_bounds(bounds: ArrayLike, dimension: int | None = None) -> Array:
+    """(d, 2) array of finite bounds, lower < upper. Raises ArgumentError otherwise."""
+    array = np.asarray(bounds, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 2 or array.shape[0] < 1:
+        raise ArgumentError("bounds", array.shape, "shape (d, 2): a lower and an upper bound a variable")
+    if not np.all(np.isfinite(array)) or np.any(array[:, 0] >= array[:, 1]):
+        raise ArgumentError("bounds", array.tolist(), "finite bounds, each lower < upper")
+    if dimension is not None and len(array) != dimension:
+        raise ArgumentError("bounds", array.shape, f"{dimension} rows, one a decision variable")
+    return array
+
+
+def checked_x0(x0: ArrayLike | None, bounds: Array) -> Array | None:
+    """Starting point (d,) inside the bounds, or None. Raises ArgumentError for anything else."""
+    if x0 is None:
+        return None
+    point = np.asarray(x0, dtype=np.float64)
+    if point.shape != (len(bounds),) or not np.all(np.isfinite(point)):
+        raise ArgumentError("x0", point.tolist(), f"{len(bounds)} finite numbers")
+    if np.any(point < bounds[:, 0]) or np.any(point > bounds[:, 1]):
+        raise ArgumentError("x0", point.tolist(), f"a point inside the bounds {bounds.tolist()}")
+    return point
