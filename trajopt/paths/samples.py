@@ -44,7 +44,15 @@ def sample_path(path: Path, s: Array) -> PathSamples:
 
     Raises InfeasibleError where the path stands still or doubles back (no direction of travel there).
     """
-    u = path.locate(s)
+    return sample_at(path, s, path.locate(s))
+
+
+def sample_at(path: Path, s: Array, u: Array) -> PathSamples:
+    """Samples at spline parameters ``u`` (N,) whose path parameters ``s`` (N,) are known.
+
+    At a knot the third derivative jumps: exactly on it this gives the limit from the right, at
+    ``np.nextafter(knot, -inf)`` the limit from the left. Raises as ``sample_path``.
+    """
     p = [path.position(u, k) for k in range(4)]
     if path.heading is None:
         return _along_tangent(s, u, p)
