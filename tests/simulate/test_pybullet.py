@@ -38,7 +38,10 @@ def test_five_metres_within_two_percent(mecanum_robot: SimRobot, name: str, dire
 def test_repetition_is_bit_identical_and_starts_as_asked(mecanum_robot: SimRobot) -> None:
     times = np.array([0.0, 0.2, 0.5])
     command = Command(
-        times, np.array([[0, 0, 0, 0], [6.0, 2.0, 3.0, 5.0], [6.0, 2.0, 3.0, 5.0]]), (1.0, -2.0, 3.0), (9.0, -7.5, 0.3, 0.0)
+        times,
+        np.array([[0, 0, 0, 0], [6.0, 2.0, 3.0, 5.0], [6.0, 2.0, 3.0, 5.0]]),
+        (1.0, -2.0, 3.0),
+        (9.0, -7.5, 0.3, 0.0),
     )
     first, again = (PyBullet().run(mecanum_robot, Scene(0.6), command) for _ in range(2))
     for name in ("times", "pose", "height", "roll", "pitch", "wheel_angles", "wheel_speeds", "contacts"):

@@ -1,0 +1,58 @@
+"""The simulator's own test: drive straight and compare with kinematics (SMDW thesis, section 5.3)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajopt.errors import ArgumentError
+from trajopt.simulate.engine import Command, Recording, SimRobot
+from trajopt.simulate.scene import require
+
+# Body directions of the three tests [rad] (SMDW thesis, Figure 5.6; left in right-handed axes).
+DIRECTIONS: tuple[tuple[str, float], ...] = (
+    ("forward", 0.0),
+    ("lateral", math.pi / 2.0),
+    ("diagonal", math.pi / 4.0),
+)
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Final place minus the commanded one: ``along``, ``across`` as shares of the distance, ``yaw`` [rad]."""
+
+    along: float
+    across: float
+    yaw: float
+
+
+def straight_command(
+    robot: SimRobot, direction: float, distance: float, speed: float, *, ramp: float = 0.5
+) -> Command:
+    """Wheel speeds that carry ``robot`` straight by ``distance`` [m] at ``speed`` [m/s].
+
+    ``direction`` [rad] in the body, ``ramp`` [s] to full speed and to rest again (chosen: 1.7 m/s^2 at
+    3 km/h, below what friction transmits). Raises ArgumentError for a distance, speed or ramp that is not
+    positive, and for a distance too short to reach full speed.
+    """
+    for name, value in (("distance", distance), ("speed", speed), ("ramp", ramp)):
+        require(name, value, low=0.0, expected="a positive number")
+    if distance < speed * ramp:
+        raise ArgumentError("distance", distance, f"at least speed * ramp = {speed * ramp:.3g} m")
+    end = distance / speed + ramp
+    full = robot.wheel_speeds(speed * math.cos(direction), speed * math.sin(direction), 0.0)
+    share = np.array([0.0, 1.0, 1.0, 0.0]) if end > 2.0 * ramp else np.array([0.0, 1.0, 0.0])
+    times = np.array([0.0, ramp, end - ramp, end]) if end > 2.0 * ramp else np.array([0.0, ramp, end])
+    return Command(times, share[:, None] * full[None, :])
+
+
+def deviation(recording: Recording, direction: float, distance: float) -> Deviation:
+    """How far the run ended from ``distance`` [m] in body ``direction`` [rad] of its first pose."""
+    first, last = recording.pose[0], recording.pose[-1]
+    heading = float(first[2]) + direction
+    moved = last[:2] - first[:2]
+    along = float(moved @ np.array([math.cos(heading), math.sin(heading)]))
+    across = float(moved @ np.array([-math.sin(heading), math.cos(heading)]))
+    return Deviation((along - distance) / distance, across / distance, float(last[2] - first[2]))
