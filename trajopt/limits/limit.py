@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
 
@@ -19,7 +20,8 @@ class Rows:
     """Rows a s'' + b s'^2 <= c at N gridpoints, R rows each, and an upper bound on s'^2.
 
     ``scale`` (N, R) is positive and has the unit of ``c``: the size of the limit itself (a wheel
-    acceleration limit, mu g, ...). Margins are reported relative to it.
+    acceleration limit, mu g, ...). Margins are reported relative to it. ``edges`` are path parameters (m)
+    where the limit jumps or bends (ends of a speed zone): time scaling puts gridpoints there.
     """
 
     name: str  # the limit's name, as reported when it binds or cannot be met
@@ -28,6 +30,7 @@ class Rows:
     c: Array  # (N, R)
     scale: Array  # (N, R)
     sd2_max: Array  # (N,) m^2/s^2, inf where the limit does not bound the speed alone
+    edges: tuple[float, ...] = ()  # m
 
 
 class Limit(Protocol):
@@ -39,3 +42,30 @@ class Limit(Protocol):
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
         """Rows at the gridpoints of ``path``. Raises ArgumentError where the limit needs a robot."""
         ...
+
+
+def linear_rows(name: str, a: Array, b: Array, c: Array, scale: Array | float) -> Rows:
+    """Rows a s'' + b s'^2 <= c, arrays (N, R), without a bound on the speed alone."""
+    return Rows(name, a, b, c, np.broadcast_to(np.asarray(scale, dtype=np.float64), a.shape),
+                np.full(len(a), np.inf))
+
+
+def speed_rows(name: str, rate: Array, largest: float) -> Rows:
+    """The bound rate * s' <= largest, with rate (N,) >= 0 per unit path speed."""
+    with np.errstate(divide="ignore", over="ignore"):
+        sd2_max = (largest / rate) ** 2  # inf where the quantity does not move
+    empty = np.zeros((len(rate), 0))
+    return Rows(name, empty, empty, empty, empty, sd2_max)
+
+
+def require_positive(argument: str, value: float, unit: str) -> None:
+    """Raises ArgumentError unless ``value`` is a finite number > 0."""
+    if not (np.isfinite(value) and value > 0):
+        raise ArgumentError(argument, value, f"a finite value > 0 {unit}")
+
+
+def require_robot(name: str, robot: Platform | None) -> Platform:
+    """The robot, or ArgumentError: the limit ``name`` cannot be told without one."""
+    if robot is None:
+        raise ArgumentError("robot", None, f"a robot: the limit '{name}' depends on its wheels or masses")
+    return robot

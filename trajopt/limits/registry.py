@@ -1,0 +1,28 @@
+"""Limits by name: a new limit is one file and one line here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from trajopt.limits.acceleration import Acceleration
+from trajopt.limits.limit import Limit
+from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
+from trajopt.limits.speed_bound import SpeedProfile, SpeedZones
+from trajopt.limits.tip import Tip
+from trajopt.limits.wheel_acceleration import WheelAcceleration
+from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.limits.yaw_rate import YawRate
+
+LIMITS: Mapping[str, Callable[..., Limit]] = MappingProxyType({
+    "acceleration": Acceleration,
+    "slip": Slip,
+    "speed": Speed,
+    "speed_profile": SpeedProfile,
+    "speed_zones": SpeedZones,
+    "tip": Tip,
+    "wheel_acceleration": WheelAcceleration,
+    "wheel_speed": WheelSpeed,
+    "yaw_rate": YawRate,
+})

@@ -1,0 +1,33 @@
+"""Acceleration of every driven wheel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajopt.limits.limit import Rows, linear_rows, require_positive, require_robot
+from trajopt.paths.samples import PathSamples
+from trajopt.robots.platform import Platform
+
+
+@dataclass(frozen=True)
+class WheelAcceleration:
+    """|angular acceleration| <= ``largest``, rad/s^2, on every driven wheel.
+
+    Wheel rates are inverse @ twist s', so their derivative is inverse @ (twist s'' + twist_rate s'^2): for
+    two fixed wheels at +-b, |(1 +- b kappa) s'' +- b kappa' s'^2| <= r largest. Two rows a wheel.
+    Raises ArgumentError unless ``largest`` > 0, or when there is no robot.
+    """
+
+    largest: float  # rad/s^2
+    name: str = "wheel_acceleration"
+
+    def __post_init__(self) -> None:
+        require_positive(f"{self.name}.largest", self.largest, "rad/s^2")
+
+    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
+        inverse = require_robot(self.name, robot).inverse
+        a, b = path.twist @ inverse.T, path.twist_rate @ inverse.T
+        a, b = np.hstack([a, -a]), np.hstack([b, -b])
+        return linear_rows(self.name, a, b, np.full_like(a, self.largest), self.largest)
