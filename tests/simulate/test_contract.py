@@ -101,7 +101,7 @@ def test_bad_scenes_robots_and_paces_are_refused(mecanum_robot: SimRobot) -> Non
 
 
 def test_unknown_engine_names_the_known_ones() -> None:
-    with pytest.raises(ArgumentError, match="one of pybullet"):
+    with pytest.raises(ArgumentError, match="pybullet, mujoco"):
         make_engine("havok")
     assert {make_engine(name).name for name in ENGINES} == set(ENGINES)
 

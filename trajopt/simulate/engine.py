@@ -21,7 +21,7 @@ from trajopt.simulate.scene import Scene, require
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 GRAVITY = 9.81  # m/s^2, standard gravity, rounded
-ENGINES = ("pybullet",)
+ENGINES = ("pybullet", "mujoco")
 
 
 @dataclass(frozen=True)
@@ -166,13 +166,14 @@ class Observation:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What happened. Times (N,) [s] from the start of the command (after settling).
+    """What happened, from the start of the command (after settling).
 
-    ``pose`` (N, 3) x, y, yaw [m, m, rad] (yaw counted on); ``height``, ``roll``, ``pitch`` (N,) [m, rad,
-    rad]; ``wheel_angles`` (N, 4) [rad] counted on; ``wheel_speeds`` (N, 4) [rad/s]; ``wheel_torques``
-    (N, 4) [N m]; ``wheel_heights`` (N, 4) wheel centres above the ground [m]; ``contacts`` (N,). ``exploded`` with its
-    ``reason`` when the run was stopped because the numbers left physics. ``wall_time`` [s] for
-    stepping, ``real_time_factor`` simulated over wall time [-], ``picture`` (H, W, 3) uint8 when asked.
+    ``times`` (N,) [s]; ``pose`` (N, 3) x, y [m] and yaw [rad], counted on; ``height`` [m], ``roll``,
+    ``pitch`` [rad] (N,) of the robot frame; ``wheel_angles`` [rad], counted on, ``wheel_speeds`` [rad/s],
+    ``wheel_torques`` [N m] and ``wheel_heights`` [m] of the wheel centres, all (N, 4); ``contacts`` (N,).
+    ``exploded`` with its ``reason`` when the run was stopped because the numbers left physics.
+    ``wall_time`` [s] of stepping, ``real_time_factor`` simulated over wall time [-], ``picture`` (H, W, 3)
+    uint8 when asked.
     """
 
     engine: str
@@ -244,4 +245,8 @@ def make_engine(name: str) -> Engine:
         from trajopt.simulate.pybullet import PyBullet
 
         return PyBullet()
+    if name == "mujoco":
+        from trajopt.simulate.mujoco import MuJoCo
+
+        return MuJoCo()
     raise ArgumentError("engine", name, "one of " + ", ".join(ENGINES))

@@ -1,0 +1,174 @@
+"""The semi-circular Mecanum double wheel (SMDW) as rollers: two hubs, half circle and half ellipse.
+
+SMDW thesis, section 4.1: each hub's outline is a half circle of radius Rc joined to a half ellipse of
+half-axes Rc and Re; the hubs sit side by side on one axle, half a turn apart, so that on flat ground one
+half circle always carries. At wheel angle 0 the outer hub has its ellipse down (the neutral position of
+Figure 4.3, largest clearance for lateral motion). The hubs of left and right wheels are mirrored
+(section 2.3.2), so this holds on both sides of the robot.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajopt.errors import ArgumentError
+from trajopt.simulate.engine import SimRobot
+from trajopt.simulate.loc8_model import (
+    COG_HEIGHT,
+    FRAME_MASS,
+    HALF_TRACK,
+    HALF_WHEELBASE,
+    ROLLER_ANGLE,
+    TORQUE_LIMIT,
+    WHEEL_MASS,
+    WHEEL_RADIUS,
+    loc8_on,
+)
+from trajopt.simulate.rollers import (
+    ROLLER_MASS,
+    FloatArray,
+    Roller,
+    RollerWheel,
+    Seat,
+    Shape,
+    place_roller,
+    reach_along_axle,
+    require_wheel,
+    turned,
+)
+
+MINOR_RADIUS = 0.047  # m, chosen: Rc - Re = 5.1 cm lets a 5 cm step pass under the ellipse
+CIRCLE_ROLLER_RADIUS = 0.0095  # m, SMDW thesis section 5.3.2 (19 mm diameter)
+ELLIPSE_ROLLER_RADIUS = 0.0125  # m, SMDW thesis section 5.3.2 (25 mm diameter)
+CIRCLE_ROLLERS = 8  # a hub, chosen with the next so that 4 wheels stay below Bullet's joint limit
+ELLIPSE_ROLLERS = 6  # a hub, chosen
+HUB_DEPTH = 0.045  # m along the axle, chosen: the width of its rollers
+HUB_GAP = 0.03  # m between the hubs, chosen: room for the arm that carries the wheel
+
+
+@dataclass(frozen=True)
+class HubSizes:
+    """Outline and place of the two hubs, all in m (see the module's constants for sources)."""
+
+    radius: float = WHEEL_RADIUS
+    minor_radius: float = MINOR_RADIUS
+    depth: float = HUB_DEPTH
+    gap: float = HUB_GAP
+
+    def __post_init__(self) -> None:
+        """Raise ArgumentError for sizes that make no double wheel."""
+        if not (math.isfinite(self.minor_radius) and 0.0 < self.minor_radius <= self.radius):
+            raise ArgumentError("minor_radius", self.minor_radius, f"a length up to {self.radius:g} m")
+        if not (0.0 < self.depth < math.inf and 0.0 <= self.gap < math.inf):
+            raise ArgumentError("depth, gap", (self.depth, self.gap), "a positive depth, a gap from 0 m")
+
+    @property
+    def offset(self) -> float:
+        """Middle plane of a hub from that of the wheel [m]."""
+        return (self.gap + self.depth) / 2.0
+
+
+def hub_support(sizes: HubSizes, phi: FloatArray) -> FloatArray:
+    """Support function [m] of one hub whose ellipse is centred on normal angle 0."""
+    ellipse = np.hypot(sizes.radius * np.sin(phi), sizes.minor_radius * np.cos(phi))
+    return np.where(np.cos(phi) >= 0.0, ellipse, sizes.radius)
+
+
+def smdw_wheel(
+    sizes: HubSizes | None = None,
+    *,
+    angle: float = -ROLLER_ANGLE,
+    outer_left: bool = True,
+    shape: Shape = "spheres",
+    spheres: int = 7,
+    circle_rollers: int = CIRCLE_ROLLERS,
+    ellipse_rollers: int = ELLIPSE_ROLLERS,
+    circle_roller_radius: float = CIRCLE_ROLLER_RADIUS,
+    ellipse_roller_radius: float = ELLIPSE_ROLLER_RADIUS,
+    mass: float = WHEEL_MASS,
+    roller_mass: float = ROLLER_MASS,
+) -> RollerWheel:
+    """SMDW wheel; ``outer_left`` says that the hub with its ellipse down at angle 0 sits at +y.
+
+    ``angle`` [rad] is the axis of the roller on the ground, from x towards y. Lengths [m], masses [kg].
+    The rollers of the ellipse share its length evenly. Raises ArgumentError naming the size that cannot
+    be built.
+    """
+    made = HubSizes() if sizes is None else sizes
+    if circle_rollers < 2 or ellipse_rollers < 2:
+        raise ArgumentError("rollers", (circle_rollers, ellipse_rollers), "at least 2 on each half of a hub")
+    hub_mass = mass - 2 * (circle_rollers + ellipse_rollers) * roller_mass
+    for radius in (circle_roller_radius, ellipse_roller_radius):
+        require_wheel(made.radius, radius, angle, hub_mass, roller_mass)
+
+    def support(phi: FloatArray) -> FloatArray:
+        return hub_support(made, phi)
+
+    arc = _circle_seats(circle_rollers, circle_roller_radius, angle)
+    oval = _ellipse_seats(made, ellipse_rollers, ellipse_roller_radius, angle)
+    hub = tuple(place_roller(seat, support, shape=shape, spheres=spheres) for seat in (*oval, *arc))
+    side = made.offset if outer_left else -made.offset
+    outer = tuple(shifted(roller, side) for roller in hub)
+    inner = tuple(shifted(turned(roller, math.pi), -side) for roller in hub)
+    width = 2.0 * reach_along_axle(outer + inner)
+    return RollerWheel(made.radius, width, angle, outer + inner, hub_mass, roller_mass)
+
+
+def _circle_seats(count: int, radius: float, angle: float) -> list[Seat]:
+    pitch = math.pi / count
+    starts = [math.pi / 2.0 + index * pitch for index in range(count)]
+    return [Seat(start + pitch / 2.0, (start, start + pitch), radius, angle) for start in starts]
+
+
+def _ellipse_seats(sizes: HubSizes, count: int, radius: float, angle: float) -> list[Seat]:
+    """Equal shares of the ellipse's length, which grows by h + h'' = (Rc Re)^2 / h^3 a radian."""
+    phi = np.linspace(-math.pi / 2.0, math.pi / 2.0, 20001)
+    rate = (sizes.radius * sizes.minor_radius) ** 2 / hub_support(sizes, phi) ** 3
+    length = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(phi))])
+    marks = np.interp(np.linspace(0.0, length[-1], 2 * count + 1), length, phi)
+    return [
+        Seat(float(marks[2 * i + 1]), (float(marks[2 * i]), float(marks[2 * i + 2])), radius, angle)
+        for i in range(count)
+    ]
+
+
+def shifted(roller: Roller, offset: float) -> Roller:
+    """The same roller, moved by ``offset`` [m] along the axle."""
+    x, y, z = roller.centre
+    return Roller((x, y + offset, z), roller.axis, roller.profile)
+
+
+def loc8_smdw(
+    sizes: HubSizes | None = None,
+    *,
+    shape: Shape = "spheres",
+    spheres: int = 7,
+    half_wheelbase: float = HALF_WHEELBASE,
+    half_track: float = HALF_TRACK,
+    frame_mass: float = FRAME_MASS,
+    wheel_mass: float = WHEEL_MASS,
+    cog_height: float = COG_HEIGHT,
+    torque_limit: float = TORQUE_LIMIT,
+) -> SimRobot:
+    """LOC8 on four SMDW wheels whose rollers stand at -45, +45, +45, -45 deg on the ground.
+
+    Lengths [m], masses [kg], torque [N m]. Raises ArgumentError naming the size that makes no robot.
+    """
+    wheels = tuple(
+        smdw_wheel(
+            sizes, angle=sign * ROLLER_ANGLE, outer_left=left, shape=shape, spheres=spheres, mass=wheel_mass
+        )
+        for sign, left in ((-1.0, True), (1.0, False), (1.0, True), (-1.0, False))
+    )
+    return loc8_on(
+        wheels,
+        name=f"LOC8 SMDW ({shape})",
+        half_wheelbase=half_wheelbase,
+        half_track=half_track,
+        frame_mass=frame_mass,
+        cog_height=cog_height,
+        torque_limit=torque_limit,
+    )
