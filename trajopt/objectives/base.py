@@ -32,11 +32,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class SymbolicProblem:
-    """min cost(z) subject to lower <= constraints(z) <= upper, as symbolic expressions.
-
-    ``slacks`` extra variables follow the decision variables in ``z``; ``start`` (slacks,) are their values
-    at the starting point.
-    """
+    """min cost subject to lower <= constraints <= upper, as symbolic expressions (None: no constraints)."""
 
     cost: Any
     constraints: Any
@@ -46,13 +42,19 @@ class SymbolicProblem:
 
 @runtime_checkable
 class Objective(Protocol):
-    """A function to minimise. ``dimension`` is the number of decision variables d."""
+    """A function to minimise. ``dimension`` is the number of decision variables d.
+
+    ``constrained`` says whether violations can be other than zero.
+    """
 
     @property
     def dimension(self) -> int: ...
 
     @property
     def provides(self) -> frozenset[Capability]: ...
+
+    @property
+    def constrained(self) -> bool: ...
 
     def evaluate(self, candidates: Array) -> Evaluation:
         """Cost and violation of candidates (n, d) on the grid that searches use."""
@@ -61,3 +63,53 @@ class Objective(Protocol):
     def score(self, candidate: Array) -> Evaluation:
         """Cost and violation of one candidate (d,), recomputed more finely than any search sees it."""
         ...
+
+
+class SymbolicObjective(Objective, Protocol):
+    """An objective with the capability SYMBOLIC."""
+
+    def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:
+        """The problem on symbols: z (d + slacks, 1), parameters (p, 1)."""
+        ...
+
+    def parameters_at(self, start: Array) -> Array:
+        """(p,): parameters (whole turns, say) that fit a starting point (d,)."""
+        ...
+
+    def slacks_at(self, start: Array) -> Array:
+        """(slacks,): slack values that fit a starting point (d,)."""
+        ...
+
+
+class ResidualObjective(Objective, Protocol):
+    """An objective with the capability RESIDUALS: gains . |residuals| is its cost."""
+
+    def residuals(self, z: Any, turns: Any, *, exact: bool = False) -> list[Any]: ...
+
+    def residual_gains(self) -> Array: ...
+
+    def nearest_turns(self, candidates: Array) -> Array: ...
+
+    def coarse(self) -> ResidualObjective: ...
+
+
+class LatticeObjective(ResidualObjective, Protocol):
+    """An objective whose critical residuals are affine modulo a period once actuators are ideal."""
+
+    def affine_part(self) -> AffinePart: ...
+
+    def effort(self, candidates: Array) -> Array: ...
+
+
+@dataclass(frozen=True)
+class AffinePart:
+    """Critical residuals = matrix @ z[variables] + offset - period * turns, actuators ideal, the rest at rest.
+
+    ``base`` (d,) holds the values of the variables that are not in ``variables``.
+    """
+
+    matrix: Array  # (c, k)
+    offset: Array  # (c,)
+    period: float
+    variables: NDArray[np.intp]  # (k,) positions in the decision vector
+    base: Array  # (d,)

@@ -25,7 +25,7 @@ from trajopt.robots.actuator import Actuator
 
 Array = NDArray[np.float64]
 
-_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(3)  # step means exact to 1e-12 rad at 250 steps
+_GAUSS_X, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)  # step means exact to 1e-12 rad at 250 steps
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Terminal:
 def wheel_travel(grid: StepGrid, kinematics: Kinematics, x: Any, y: Any, yaw: Any) -> list[Any]:
     """Wheel rotation in each step, rad: W lists of (steps, n). ``x``, ``y``, ``yaw`` are control values (K, n)."""
     body_x, body_y = 0.0, 0.0
-    for value, rate, weight in zip(grid.gauss_value, grid.gauss_rate, _GAUSS_W, strict=True):
+    for value, rate, weight in zip(grid.gauss_value, grid.gauss_rate, GAUSS_WEIGHTS, strict=True):
         angle = value @ yaw
         cos, sin, dx, dy = np.cos(angle), np.sin(angle), rate @ x, rate @ y
         scale = float(weight * grid.width / 2)

@@ -8,15 +8,16 @@ The wheel deviation is the circular distance modulo the period, folded to [0, pe
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
+from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
 from trajopt.objectives.exact import exact_terminal
 from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
 from trajopt.paths.path import Path
@@ -29,6 +30,7 @@ from trajopt.robots.platform import Platform
 Array = NDArray[np.float64]
 
 SEARCH_STEPS = 252  # 84 steps a spline segment, 14 to 20 ms on the problems at hand; chosen
+COARSE_STEPS = 84  # steps for Newton steps, chosen
 HEADING_MARGIN = np.pi / 2  # rad beyond start and goal heading for free heading control points, chosen
 DURATION_RANGE = (0.25, 4.0)  # times the nominal duration, for a free duration, chosen
 
@@ -77,6 +79,10 @@ class TerminalObjective:
     def provides(self) -> frozenset[Capability]:
         always = {Capability.BATCH, Capability.RESIDUALS, Capability.SYMBOLIC}
         return frozenset(always | ({Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set()))
+
+    @property
+    def constrained(self) -> bool:
+        return False
 
     # -- decision variables ---------------------------------------------------------------------------
 
@@ -141,9 +147,16 @@ class TerminalObjective:
     # -- cost -----------------------------------------------------------------------------------------
 
     def predict(self, z: Any) -> Terminal:
-        """Final state on the search grid, for decision variables (d, n)."""
+        """Final state on the search grid, for decision variables (d, n); compiled where that is possible."""
         points = self.control_points(z)
         grid = step_grid(self.basis, self.steps)
+        if isinstance(z, np.ndarray) and not self.actuator.is_ideal and swarm_engine() == "numba":
+            from trajopt.objectives import compiled
+
+            if compiled.fits(grid, self.model, points.yaw):
+                end = compiled.roll_out_swarm(grid, self.model, self.actuator, points.x, points.y, points.yaw,
+                                              points.duration)
+                return Terminal(end[0:1], end[1:2], end[2:3], tuple(end[i : i + 1] for i in range(3, 7)))
         return roll_out(grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration)
 
     def predict_exactly(self, candidate: Array) -> Terminal:
@@ -216,14 +229,24 @@ class TerminalObjective:
         if not self.is_affine:
             raise ArgumentError("spline.free", list(self.problem.spline.free),
                                 "p1 and p2 only, and no actuator, for affine wheel angles")
-        d = self.dimension
-        probes = np.hstack([np.zeros((d, 1)), np.eye(d)])
+        part = self.affine_part()
+        return part.matrix, part.offset
+
+    def affine_part(self) -> AffinePart:
+        """The affine residuals of p1 and p2 with ideal actuators, everything else at its default."""
+        variables = np.array([i for i, name in enumerate(self.names) if name[:4] in ("p1.x", "p1.y", "p2.x", "p2.y")])
+        if variables.size == 0:
+            raise ArgumentError("spline.free", list(self.problem.spline.free), "p1 or p2 among the free values")
+        probes = np.tile(self.default[:, None], variables.size + 1)
+        probes[variables, 0] = 0.0
+        probes[variables[:, None], np.arange(1, variables.size + 1)] = np.eye(variables.size)
         points = self.control_points(probes)
         travel = wheel_travel(step_grid(self.basis, 48), self.model, points.x, points.y, points.yaw)
         ends = Terminal(points.x[-1:], points.y[-1:], points.yaw[-1:],
                         tuple(q.sum(axis=0, keepdims=True) for q in travel))
         errors = np.vstack([np.asarray(e) for e in self.wheel_errors(ends)])
-        return errors[:, 1:] - errors[:, :1], errors[:, 0]
+        return AffinePart(errors[:, 1:] - errors[:, :1], errors[:, 0], self.problem.objective.period, variables,
+                          self.default)
 
     def gradient(self, candidate: Array) -> Array:
         """(d,): gradient of the cost where affine (a subgradient at its kinks)."""
@@ -231,26 +254,44 @@ class TerminalObjective:
         deviation = folded(matrix @ candidate + offset, self.problem.objective.period)
         return np.asarray(self.problem.objective.wheel_gain * np.sign(deviation) @ matrix)
 
-    def symbolic(self, z: Any, start: Array) -> SymbolicProblem:
-        """Table 4.4 as a smooth program, turns fixed to those nearest at ``start`` (d,).
+    def coarse(self) -> TerminalObjective:
+        """The same objective on a third of the grid, for Newton steps that are made exact afterwards."""
+        return replace(self, steps=COARSE_STEPS)
+
+    def effort(self, candidates: Array) -> Array:
+        """(n,): the fastest wheel's peak rate per unit of spline parameter; ranks exact solutions."""
+        points = self.control_points(np.asarray(candidates, dtype=np.float64).T)
+        grid = step_grid(self.basis, 24)
+        travel = wheel_travel(grid, self.model, points.x, points.y, points.yaw)
+        return np.asarray(np.max(np.abs(travel), axis=(0, 1)) / grid.width)
+
+    def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:
+        """Table 4.4 as a smooth program, whole turns fixed by ``parameters`` (c, 1).
 
         ``z`` (d + m, 1) holds the decision variables and one slack a residual: minimise gains . slack
         subject to slack - r >= 0 and slack + r >= 0, so that slack = |r| at the optimum.
         """
-        turns = self.nearest_turns(start[None])[0]
+        turns = [parameters[i : i + 1] for i in range(len(self.problem.goal.critical))]
         r = self.residuals(z[: self.dimension], turns)
         slack = [z[self.dimension + i : self.dimension + i + 1] for i in range(len(r))]
-        gains = self.residual_gains()
         cost: Any = 0.0
-        for gain, value in zip(gains.tolist(), slack, strict=True):
+        for gain, value in zip(self.residual_gains().tolist(), slack, strict=True):
             cost = cost + gain * value
         rows = [row for value, error in zip(slack, r, strict=True) for row in (value - error, value + error)]
         return SymbolicProblem(cost, np.vstack(rows), np.zeros(len(rows)), np.full(len(rows), np.inf))
 
-    def slack_start(self, start: Array) -> Array:
-        """(m,): values of the slacks of ``symbolic`` at a starting point (d,)."""
-        turns = self.nearest_turns(start[None])[0]
-        return np.array([float(np.abs(np.squeeze(v))) for v in self.residuals(start[:, None], turns)])
+    def parameters_at(self, start: Array) -> Array:
+        return np.asarray(self.nearest_turns(start[None])[0])
+
+    def slacks_at(self, start: Array) -> Array:
+        residuals = self.residuals(start[:, None], self.parameters_at(start))
+        return np.array([float(np.abs(np.squeeze(v))) for v in residuals])
+
+
+@lru_cache(maxsize=1)
+def swarm_engine() -> str:
+    """What predicts swarms through actuators: "numba", or "numpy" where numba is not installed."""
+    return "numba" if importlib.util.find_spec("numba") else "numpy"
 
 
 def folded(angle: Any, period: float) -> Any:

@@ -127,6 +127,7 @@ class Run:
     best_cost: float = np.inf
     best_violation: float = np.inf
     on_progress: Callable[[int, float], None] | None = None
+    _proposals: list[Array] = field(default_factory=list)
     _rows: list[tuple[int, float, float, float]] = field(default_factory=list)
     _samples: list[Array] = field(default_factory=list)
     _kept: int = 0
@@ -204,6 +205,18 @@ class Run:
         if self.on_progress is not None:
             self.on_progress(self.nfev, self.best_cost)
 
+    def spend(self, evaluations: int) -> None:
+        """Count work on the objective that does not go through ``evaluate`` (residuals, derivatives)."""
+        self.nfev += evaluations
+        if self.remaining() <= 0:
+            self.stop(Status.EVALUATIONS)
+        if self.budget.seconds is not None and self.elapsed >= self.budget.seconds:
+            self.stop(Status.SECONDS)
+
+    def propose(self, candidate: Array) -> None:
+        """Enter a candidate (d,) into the final judgement, whatever its cost on the search grid is."""
+        self._proposals.append(np.clip(candidate, self.bounds[:, 0], self.bounds[:, 1]))
+
     @property
     def elapsed(self) -> float:
         return time.perf_counter() - self._started
@@ -216,6 +229,16 @@ class Run:
         """End the search now."""
         raise _Stop(status)
 
+    def _judged(self) -> tuple[Array, float, float]:
+        """The best candidate by the objective's own fine score, with its cost and violation."""
+        found = [] if self.best_x is None else [np.clip(self.best_x, self.bounds[:, 0], self.bounds[:, 1])]
+        best = (self.bounds.mean(axis=1), np.inf, np.inf)
+        for x in [*found, *self._proposals]:
+            scored = self.objective.score(x)
+            if better(scored.cost[0], scored.violation[0], best[1], best[2]):
+                best = (x, float(scored.cost[0]), float(scored.violation[0]))
+        return best
+
     # -- finishing ------------------------------------------------------------------------------------
 
     def finish(self, optimizer: str, search: Callable[[], tuple[Status, str]]) -> OptimizeResult:
@@ -224,15 +247,9 @@ class Run:
             status, message = search()
         except _Stop as stop:
             status, message = stop.status, ""
-        x = self.best_x
-        if x is None:
-            x = self.bounds.mean(axis=1)
+        x, fun, violation = self._judged()
+        if not np.isfinite(fun):
             status = Status.FAILED
-            fun = violation = np.inf
-        else:
-            x = np.clip(x, self.bounds[:, 0], self.bounds[:, 1])
-            scored = self.objective.score(x)
-            fun, violation = float(scored.cost[0]), float(scored.violation[0])
         if status is not Status.FAILED and not violation <= FEASIBLE:
             status = Status.INFEASIBLE
         text = f"{message}: {status.value}" if message else status.value

@@ -37,9 +37,19 @@ class FunctionObjective:
     def score(self, candidate: Array) -> Evaluation:
         return self.evaluate(candidate[None])
 
-    def symbolic(self, z: Any, start: Array) -> SymbolicProblem:  # noqa: ARG002 - the protocol's signature
+    @property
+    def constrained(self) -> bool:
+        return False
+
+    def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:  # noqa: ARG002 - the protocol's signature
         """The function on a symbolic vector (d,)."""
         return SymbolicProblem(self.function(z), None, np.zeros(0), np.zeros(0))
+
+    def parameters_at(self, start: Array) -> Array:  # noqa: ARG002
+        return np.zeros(0)
+
+    def slacks_at(self, start: Array) -> Array:  # noqa: ARG002
+        return np.zeros(0)
 
 
 def as_objective(objective: Objective | Callable[[Any], Any], bounds: Array) -> Objective:

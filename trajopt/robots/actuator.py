@@ -20,6 +20,9 @@ import numpy as np
 from trajopt.errors import ArgumentError
 
 
+SMALL_SPAN = 1e-9  # rad/s; a step with less change of speed is taken as constant
+
+
 @dataclass(frozen=True)
 class Actuator:
     """Wheel speed limits, rad/s: ``saturation`` > ``dead_zone`` >= 0. ``Actuator()`` limits nothing."""
@@ -48,7 +51,7 @@ class Actuator:
             return mean
         low, high = mean - half_span, mean + half_span
         span = high - low
-        small = np.abs(span) < 1e-9
+        small = np.abs(span) < SMALL_SPAN
         return np.where(small, self.output(mean),
                         self._integral(low, high) / np.where(small, 1.0, span))
 

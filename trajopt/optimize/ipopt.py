@@ -1,0 +1,198 @@
+"""CasADi and IPOPT behind the package's contract: exact first and second derivatives of the same formulas.
+
+The objective's NumPy formulas run on CasADi symbols (CasADi's NumPy mode), so physics exists once. Whole
+turns are parameters of the program, fixed at each start to the nearest ones; starts are lattice points where
+the objective has a lattice, then x0, then seeded random points. A Newton polish on the residuals makes the
+result exact where the objective has residuals. The only module that imports casadi.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, cast
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.objectives.base import (
+    Capability,
+    LatticeObjective,
+    Objective,
+    ResidualObjective,
+    SymbolicObjective,
+    SymbolicProblem,
+)
+from trajopt.optimize.base import Budget, OptimizeResult, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.lattice import EXACT, lattice_points
+from trajopt.optimize.newton import solve_residuals
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ipopt:
+    """IPOPT from several starts.
+
+    ``starts``: number of starts in all. ``lattice_starts``: how many of them may be lattice points.
+    ``polish``: Newton on the residuals after each start. ``stop_when_exact``: skip the remaining starts once
+    the cost is below 1e-9. ``tolerance``: IPOPT's tol.
+    """
+
+    name: ClassVar[str] = "ipopt"
+    needs: ClassVar[frozenset[Capability]] = frozenset({Capability.SYMBOLIC})
+    stochastic: ClassVar[bool] = True
+
+    starts: int = 20  # chosen
+    lattice_starts: int = 8  # chosen
+    max_iterations: int = 200
+    tolerance: float = 1e-10
+    polish: bool = True
+    stop_when_exact: bool = True
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget) -> OptimizeResult:
+        """Search. ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the history, and
+        the polish. Raises ArgumentError when the objective cannot be written in symbols."""
+        box = checked_bounds(bounds, objective.dimension)
+        start = checked_x0(x0, box)
+        run = Run(objective, box, budget)
+        program = _Program.of(self, run, cast(SymbolicObjective, objective))
+        return run.finish(self.name, lambda: self._search(run, program, start, rng))
+
+    def _search(self, run: Run, program: _Program, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        residual = Capability.RESIDUALS in run.objective.provides
+        successes = tried = 0
+        for start in self._starts(run, x0, rng):
+            tried += 1
+            x = program.solve(start)
+            if self.polish and residual:
+                with_residuals = cast(ResidualObjective, run.objective)
+                turns = with_residuals.nearest_turns(x[None])[0]
+                x = solve_residuals(run, with_residuals, x, turns, iterations=12).x
+            run.propose(x)
+            if residual:
+                exact = float(run.objective.score(x).cost[0]) <= EXACT
+                successes += exact
+                if exact and self.stop_when_exact:
+                    break
+        if not residual:
+            return Status.CONVERGED, f"{tried} starts"
+        status = Status.CONVERGED if successes else Status.NO_EXACT
+        return status, f"{successes} of {tried} starts exact"
+
+    def _starts(self, run: Run, x0: Array | None, rng: Generator) -> list[Array]:
+        """Lattice points by peak wheel rate, then x0 or the middle of the bounds, then random points."""
+        found: list[Array] = []
+        if self.lattice_starts and hasattr(run.objective, "affine_part"):
+            objective = cast(LatticeObjective, run.objective)
+            part = objective.affine_part()
+            points, _ = lattice_points(part, run.bounds[part.variables])
+            candidates = np.tile(part.base, (len(points), 1))
+            candidates[:, part.variables] = points
+            if len(points):
+                order = np.argsort(objective.effort(candidates), kind="stable")
+                found = list(candidates[order][: self.lattice_starts])
+        found.insert(0 if x0 is not None else len(found), run.bounds.mean(axis=1) if x0 is None else x0)
+        while len(found) < self.starts:
+            found.append(rng.uniform(run.bounds[:, 0], run.bounds[:, 1]))
+        return found[: self.starts]
+
+
+@dataclass
+class _Program:
+    """One compiled NLP, solved from many starts."""
+
+    run: Run
+    objective: SymbolicObjective
+    solver: Any
+    slacks: int
+    lower: Array
+    upper: Array
+    watch: Any
+
+    @classmethod
+    def of(cls, options: Ipopt, run: Run, objective: SymbolicObjective) -> _Program:
+        """Write the objective in symbols and hand it to IPOPT."""
+        import casadi as ca
+
+        ca.GlobalOptions.setNumpyMode(1)
+        middle = run.bounds.mean(axis=1)
+        parameters, slacks = objective.parameters_at(middle), objective.slacks_at(middle)
+        z = ca.MX.sym("z", run.objective.dimension + len(slacks))
+        p = ca.MX.sym("p", len(parameters))
+        problem = _in_symbols(objective, z, p)
+        constraints = ca.MX(0, 1) if problem.constraints is None else ca.MX(problem.constraints)
+        watch = _watcher(ca, run, z.numel(), constraints.numel(), p.numel())
+        settings: dict[str, Any] = {
+            "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": options.tolerance,
+            "ipopt.max_iter": options.max_iterations, "iteration_callback": watch,
+            "ipopt.bound_relax_factor": 0.0, "error_on_fail": False,
+        }
+        if run.budget.seconds is not None:
+            settings["ipopt.max_wall_time"] = run.budget.seconds
+        nlp = {"x": z, "f": ca.MX(problem.cost), "g": constraints, "p": p}
+        return cls(run, objective, ca.nlpsol("trajopt", "ipopt", nlp, settings), len(slacks),
+                   problem.lower, problem.upper, watch)
+
+    def solve(self, start: Array) -> Array:
+        """The decision variables (d,) where IPOPT ended from ``start`` (d,)."""
+        slacks = self.objective.slacks_at(start)
+        d = len(start)
+        solution = self.solver(
+            x0=np.concatenate([start, slacks]), p=self.objective.parameters_at(start),
+            lbx=np.concatenate([self.run.bounds[:, 0], np.zeros(self.slacks)]),
+            ubx=np.concatenate([self.run.bounds[:, 1], np.full(self.slacks, np.inf)]),
+            lbg=self.lower, ubg=self.upper)
+        stats = self.solver.stats()
+        self.run.nit += int(stats["iter_count"])
+        if self.watch.stopped is not None:
+            self.run.stop(self.watch.stopped)
+        x = np.clip(np.asarray(solution["x"]).ravel()[:d], self.run.bounds[:, 0], self.run.bounds[:, 1])
+        if not np.all(np.isfinite(x)):
+            return start
+        self.run.evaluate(x[None])
+        self.run.spend(int(stats.get("n_call_nlp_f", 0)))
+        return np.asarray(x)
+
+
+def _in_symbols(objective: SymbolicObjective, z: Any, p: Any) -> SymbolicProblem:
+    try:
+        return objective.symbolic(z, p)
+    except Exception as error:  # whatever a user's function raises on symbols
+        raise ArgumentError("objective", f"{type(error).__name__}: {error}", "a function written with NumPy "
+                            "functions and arithmetic on its components, so that it runs on CasADi symbols; "
+                            "take slsqp or pso otherwise") from error
+
+
+def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
+    """A CasADi callback that records each iterate in the run and stops IPOPT when the budget is used up."""
+    d = run.objective.dimension
+
+    class Watch(ca.Callback):  # type: ignore[misc]
+        def __init__(self) -> None:
+            ca.Callback.__init__(self)
+            self.stopped: Status | None = None
+            self.construct("watch", {})
+
+        def get_n_in(self) -> int:
+            return int(ca.nlpsol_n_out())
+
+        def get_n_out(self) -> int:
+            return 1
+
+        def get_sparsity_in(self, i: int) -> Any:
+            sizes = {"f": 1, "x": nx, "lam_x": nx, "g": ng, "lam_g": ng, "p": np_, "lam_p": np_}
+            return ca.Sparsity.dense(sizes.get(ca.nlpsol_out(i), 0), 1)
+
+        def eval(self, arguments: Any) -> list[int]:
+            x = np.asarray(arguments[0]).ravel()[:d]
+            try:
+                run.evaluate(np.clip(x, run.bounds[:, 0], run.bounds[:, 1])[None])
+            except Exception as stop:  # exceptions cannot cross CasADi: remember, and ask IPOPT to end
+                self.stopped = getattr(stop, "status", Status.FAILED)
+                return [1]
+            return [0]
+
+    return Watch()

@@ -1,0 +1,200 @@
+"""Exact terminal wheel angles in closed form: the lattice of whole turns.
+
+With a prescribed heading and ideal actuators the critical wheel angles are affine in the control points, so
+every exact solution is matrix^-1 (period * turns - offset) for whole numbers of turns (for free P1 and P2:
+the one nearest to the default control points). Those inside the bounds are ranked by the peak wheel rate.
+Where actuators limit the wheels or the heading is free, each lattice point starts a Newton solve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, cast
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.objectives.base import AffinePart, Capability, LatticeObjective, Objective
+from trajopt.optimize.base import Budget, OptimizeResult, Run, Status, checked_bounds
+from trajopt.optimize.newton import solve_residuals
+
+Array = NDArray[np.float64]
+
+EXACT = 1e-9  # cost up to which a solution counts as exact
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Closed form over whole turns, then damped minimum-norm Newton where actuators limit the wheels.
+
+    ``rounds``: how often Newton may go through all lattice points; from the second time on they are those
+    nearest to a random base point.
+    """
+
+    name: ClassVar[str] = "lattice"
+    needs: ClassVar[frozenset[Capability]] = frozenset({Capability.RESIDUALS})
+    stochastic: ClassVar[bool] = False
+
+    rounds: int = 5  # chosen
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget) -> OptimizeResult:
+        """Solve. ``x0`` is not used: the method needs no start. ``rng`` draws base points for later rounds.
+
+        Raises ArgumentError for an objective without an affine part.
+        """
+        if not hasattr(objective, "affine_part"):
+            raise ArgumentError("optimizer", self.name, "an objective with affine wheel angles (the terminal "
+                                                        "objective); take pso or differential-evolution here")
+        box = checked_bounds(bounds, objective.dimension)
+        run = Run(objective, box, budget)
+        return run.finish(self.name, lambda: self._search(run, cast(LatticeObjective, objective), rng))
+
+    def _search(self, run: Run, objective: LatticeObjective, rng: Generator) -> tuple[Status, str]:
+        part = objective.affine_part()
+        box = run.bounds[part.variables]
+        points, turns = lattice_points(part, box)
+        candidates = np.tile(part.base, (len(points), 1))
+        candidates[:, part.variables] = points
+        if len(points) == 0:
+            return self._nearest(run, objective, part, box)
+        order = np.argsort(objective.effort(candidates), kind="stable")
+        candidates, turns = candidates[order], turns[order]
+        if Capability.AFFINE in objective.provides:
+            run.nit = 1
+            cost = run.evaluate(candidates).cost
+            run.propose(candidates[0])
+            if cost[0] <= EXACT:
+                return Status.CONVERGED, f"{len(points)} exact solutions inside the bounds, the one with the " \
+                                         f"lowest peak wheel rate taken"
+            return Status.NO_EXACT, "the critical wheels over-determine the control points"
+        return self._through_actuators(run, objective, part, candidates, turns, rng)
+
+    def _through_actuators(self, run: Run, objective: LatticeObjective, part: AffinePart, candidates: Array,
+                           turns: Array, rng: Generator) -> tuple[Status, str]:
+        """Newton from each lattice point, then from lattice points of other base points."""
+        for attempt in range(self.rounds):
+            for x, k in zip(candidates, turns, strict=True):
+                run.nit += 1
+                outcome = solve_residuals(run, objective, x, k)
+                run.evaluate(outcome.x[None])
+                run.propose(outcome.x)
+                if outcome.solved:
+                    return Status.CONVERGED, f"exact through the actuators after {run.nit} Newton solves"
+            base = run.bounds.mean(axis=1) + (rng.random(len(run.bounds)) - 0.5) * (run.bounds[:, 1] - run.bounds[:, 0]) * 0.8
+            base = np.where(np.isin(np.arange(len(base)), part.variables), base, 0.75 * part.base + 0.25 * base)
+            points, turns = lattice_points(replace(part, base=base), run.bounds[part.variables])
+            candidates = np.tile(base, (len(points), 1))
+            candidates[:, part.variables] = points
+        return Status.NO_EXACT, f"Newton solved none of {run.nit} starts"
+
+    def _nearest(self, run: Run, objective: LatticeObjective, part: AffinePart, box: Array) -> tuple[Status, str]:
+        """No lattice point inside: the best of the places where single wheels are exact, or of the corners."""
+        corners = _arrangement_vertices(part, box)
+        candidates = np.tile(part.base, (len(corners), 1))
+        candidates[:, part.variables] = corners
+        run.nit = 1
+        cost = run.evaluate(candidates).cost
+        best = candidates[int(np.argmin(cost))]
+        if Capability.AFFINE not in objective.provides:
+            outcome = solve_residuals(run, objective, best, objective.nearest_turns(best[None])[0])
+            run.evaluate(outcome.x[None])
+            run.propose(outcome.x)
+            if outcome.solved:
+                return Status.CONVERGED, "exact through the actuators, though no lattice point is inside the bounds"
+        return Status.NO_EXACT, "no lattice point lies inside the bounds"
+
+
+def lattice_points(part: AffinePart, box: Array) -> tuple[Array, Array]:
+    """All exact solutions (n, k) inside ``box`` (k, 2), and their whole turns (n, c).
+
+    With as many variables as critical wheels these are all there are; with more, for each set of turns the
+    solution nearest to the base point (scaled by the box) is taken, kept inside the box where possible.
+    """
+    rows = _independent_rows(part.matrix)
+    matrix, offset = part.matrix[rows], part.offset[rows]
+    centre, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
+    middle, reach = matrix @ centre + offset, np.abs(matrix) @ half
+    spans = [np.arange(np.ceil((m - r) / part.period), np.floor((m + r) / part.period) + 1)
+             for m, r in zip(middle, reach, strict=True)]
+    turns = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, len(spans))
+    if len(turns) == 0:
+        return np.zeros((0, len(box))), np.zeros((0, len(part.offset)))
+    points = _least_change(matrix, part.period * turns - offset, part.base[part.variables], box)
+    found = np.isfinite(points).all(axis=1)
+    points, turns = points[found], turns[found]
+    exact = np.max(np.abs(points @ matrix.T + offset - part.period * turns), axis=1, initial=0.0) < 1e-11
+    points = points[exact]
+    every = np.round((points @ part.matrix.T + part.offset) / part.period)
+    return points, every
+
+
+def _independent_rows(matrix: Array) -> list[int]:
+    """Rows that span the row space (critical wheels can depend on each other)."""
+    rows: list[int] = []
+    for i in range(len(matrix)):
+        if np.linalg.matrix_rank(matrix[[*rows, i]], tol=1e-9 * np.abs(matrix).max()) == len(rows) + 1:
+            rows.append(i)
+    if not rows:
+        raise ArgumentError("goal.pose", "no turn between start and goal", "a change of heading: without one "
+                            "the final wheel angles do not depend on the control points")
+    return rows
+
+
+def _least_change(matrix: Array, targets: Array, base: Array, box: Array) -> Array:
+    """(n, k): for each target (n, c), the solution of matrix @ z = target nearest to ``base``.
+
+    Variables that fall outside the box are held at its border and the others solved again, so a returned
+    row may miss its target: then no solution was found inside.
+    """
+    width = box[:, 1] - box[:, 0]
+    points = base + (targets - matrix @ base) @ np.linalg.pinv(matrix * width).T * width
+    inside = np.all((points >= box[:, 0]) & (points <= box[:, 1]), axis=1)
+    if matrix.shape[1] == matrix.shape[0]:
+        return np.where(inside[:, None], points, np.inf)
+    for i in np.flatnonzero(~inside):
+        points[i] = _held_inside(matrix, targets[i], points[i], box, width)
+    return points
+
+
+def _held_inside(matrix: Array, target: Array, point: Array, box: Array, width: Array) -> Array:
+    free = np.ones(len(point), dtype=bool)
+    z = point.copy()
+    while free.sum() > matrix.shape[0]:
+        beyond = np.maximum(box[:, 0] - z, z - box[:, 1]) / width
+        beyond[~free] = -np.inf
+        worst = int(np.argmax(beyond))
+        if beyond[worst] <= 0:
+            break
+        z[worst] = np.clip(z[worst], *box[worst])
+        free[worst] = False
+        rest = target - matrix[:, ~free] @ z[~free] - matrix[:, free] @ z[free]
+        z[free] += width[free] * (np.linalg.pinv(matrix[:, free] * width[free]) @ rest)
+    inside = np.all((z >= box[:, 0] - 1e-12) & (z <= box[:, 1] + 1e-12))
+    return np.clip(z, box[:, 0], box[:, 1]) if inside else np.full(len(z), np.inf)
+
+
+def _arrangement_vertices(part: AffinePart, box: Array) -> Array:
+    """(n, k): corners of the box and, on each of its edges, the points where one critical wheel is exact.
+
+    Without lattice points inside a two-variable box, the piecewise linear cost has its minimum at one of
+    these; with more variables they are good starts.
+    """
+    k = len(box)
+    corners = np.stack(np.meshgrid(*box, indexing="ij"), axis=-1).reshape(-1, k)
+    found = [corners]
+    for axis in range(k):
+        ends = corners[corners[:, axis] == box[axis, 0]]
+        for row, offset in zip(part.matrix, part.offset, strict=True):
+            if abs(row[axis]) < 1e-12:
+                continue
+            low = ends @ row + offset
+            high = low + row[axis] * (box[axis, 1] - box[axis, 0])
+            for end, a, b in zip(ends, low, high, strict=True):
+                turns = np.arange(np.ceil(min(a, b) / part.period), np.floor(max(a, b) / part.period) + 1)
+                points = np.tile(end, (len(turns), 1))
+                points[:, axis] += (turns * part.period - a) / row[axis]
+                found.append(points)
+    return np.clip(np.concatenate(found), box[:, 0], box[:, 1])

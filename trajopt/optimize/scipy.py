@@ -1,0 +1,150 @@
+"""Methods of scipy.optimize behind the package's contract. The only module that imports scipy.optimize."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.objectives.base import Capability, Evaluation, Objective
+from trajopt.optimize.base import Budget, OptimizeResult, Run, Status, checked_bounds, checked_x0
+
+Array = NDArray[np.float64]
+
+_LARGE = 1e100  # stands for an infeasible evaluation, since line searches cannot work with inf
+
+
+@dataclass
+class _Point:
+    """Cost and violation of the last candidate, so that a method asking for both pays once."""
+
+    run: Run
+    x: Array = field(default_factory=lambda: np.zeros(0))
+    value: Evaluation | None = None
+
+    def at(self, x: Array) -> Evaluation:
+        inside = np.clip(x, self.run.bounds[:, 0], self.run.bounds[:, 1])  # undo rounding beyond the bounds
+        if self.value is None or not np.array_equal(inside, self.x):
+            self.x, self.value = inside.copy(), self.run.evaluate(inside[None])
+        return self.value
+
+    def cost(self, x: Array) -> float:
+        return float(min(self.at(x).cost[0], _LARGE))
+
+    def violation(self, x: Array) -> float:
+        return float(min(self.at(x).violation[0], _LARGE))
+
+
+@dataclass(frozen=True)
+class ScipyLocal:
+    """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from random points.
+
+    ``starts``: number of starts; later ones are drawn uniformly from the bounds. Derivatives are the
+    objective's own where it offers them, SciPy's finite differences (counted as evaluations) otherwise.
+    """
+
+    needs: ClassVar[frozenset[Capability]] = frozenset()
+    stochastic: ClassVar[bool] = True
+
+    method: Literal["SLSQP", "L-BFGS-B", "trust-constr", "Nelder-Mead"]
+    starts: int = 10  # chosen
+    tolerance: float = 1e-12  # SciPy's tol; tight, because budgets end searches here
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self.method.lower()
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget) -> OptimizeResult:
+        """Search from each start in turn. Raises ArgumentError for a constrained objective where the method
+        knows only bounds (l-bfgs-b, nelder-mead)."""
+        if objective.constrained and self.method in ("L-BFGS-B", "Nelder-Mead"):
+            raise ArgumentError("optimizer", self.name, "a method that handles constraints for this objective: "
+                                "pso, differential-evolution, slsqp or trust-constr")
+        box = checked_bounds(bounds, objective.dimension)
+        run = Run(objective, box, budget)
+        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
+
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        from scipy import optimize
+
+        point = _Point(run)
+        gradient = getattr(run.objective, "gradient", None)
+        offered = Capability.GRADIENT in run.objective.provides and self.method != "Nelder-Mead"
+        low, high = run.bounds.T
+        options: dict[str, Any] = {"maxiter": 10_000}
+        for index in range(self.starts):
+            start = (low + high) / 2 if x0 is None else x0
+            if index > 0:
+                start = rng.uniform(low, high)
+            constraints = optimize.NonlinearConstraint(point.violation, -np.inf, 0.0)
+            result = optimize.minimize(
+                point.cost, start, method=self.method, bounds=optimize.Bounds(low, high), tol=self.tolerance,
+                jac=gradient if offered else None, options=options,
+                **({"constraints": [constraints]} if run.objective.constrained else {}))
+            run.nit += int(result.nit)
+        return Status.CONVERGED, f"{self.starts} starts"
+
+
+@dataclass(frozen=True)
+class DifferentialEvolution:
+    """scipy.optimize.differential_evolution with its own defaults, ``population`` as popsize."""
+
+    name: ClassVar[str] = "differential-evolution"
+    needs: ClassVar[frozenset[Capability]] = frozenset()
+    stochastic: ClassVar[bool] = True
+
+    population: int = 15  # SciPy's default
+    tolerance: float = 1e-12  # SciPy's tol on the population's spread; tight, because budgets end searches
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget) -> OptimizeResult:
+        """Search until the population has collapsed or the budget ends, then SciPy's local polish."""
+        box = checked_bounds(bounds, objective.dimension)
+        run = Run(objective, box, budget)
+        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
+
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        from scipy import optimize
+
+        constrained = run.objective.constrained
+        point = _Point(run)
+
+        def costs(x: Array) -> Any:
+            """SciPy hands one candidate (d,) when polishing and candidates in columns (d, n) otherwise."""
+            if x.ndim == 1:
+                return point.cost(x)
+            return np.minimum(run.evaluate(x.T).cost, _LARGE)
+
+        extra: dict[str, Any] = {"vectorized": True, "updating": "deferred"}
+        if constrained:  # SciPy evaluates constraints one by one unless both are vectorised
+            extra = {"constraints": (optimize.NonlinearConstraint(point.violation, -np.inf, 0.0),)}
+        result = optimize.differential_evolution(
+            point.cost if constrained else costs, optimize.Bounds(*run.bounds.T), x0=x0, rng=rng,
+            popsize=self.population, tol=self.tolerance, maxiter=1_000_000, polish=not constrained, **extra)
+        run.nit = int(result.nit)
+        return Status.CONVERGED, str(result.message)
+
+
+def slsqp() -> ScipyLocal:
+    """Sequential least-squares programming."""
+    return ScipyLocal("SLSQP")
+
+
+def l_bfgs_b() -> ScipyLocal:
+    """Limited-memory BFGS within bounds."""
+    return ScipyLocal("L-BFGS-B")
+
+
+def trust_constr() -> ScipyLocal:
+    """Trust-region method for constrained problems."""
+    return ScipyLocal("trust-constr", starts=3)
+
+
+def nelder_mead() -> ScipyLocal:
+    """Simplex search within bounds."""
+    return ScipyLocal("Nelder-Mead")

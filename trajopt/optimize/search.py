@@ -1,0 +1,70 @@
+"""``minimize``: the one entry to every optimizer, and the list of optimizers, one line each."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from trajopt.errors import ArgumentError
+from trajopt.objectives.base import Capability, Objective
+from trajopt.optimize.base import Budget, Optimizer, OptimizeResult, checked_bounds
+from trajopt.optimize.functions import as_objective
+
+# name -> module and the class or preset function that makes it with default options
+OPTIMIZERS: dict[str, tuple[str, str]] = {
+    "pso": ("trajopt.optimize.pso", "constriction"),
+    "pso-thesis-first": ("trajopt.optimize.pso", "thesis_first"),
+    "pso-thesis-enhanced": ("trajopt.optimize.pso", "thesis_enhanced"),
+    "lattice": ("trajopt.optimize.lattice", "Lattice"),
+    "ipopt": ("trajopt.optimize.ipopt", "Ipopt"),
+    "slsqp": ("trajopt.optimize.scipy", "slsqp"),
+    "l-bfgs-b": ("trajopt.optimize.scipy", "l_bfgs_b"),
+    "trust-constr": ("trajopt.optimize.scipy", "trust_constr"),
+    "nelder-mead": ("trajopt.optimize.scipy", "nelder_mead"),
+    "differential-evolution": ("trajopt.optimize.scipy", "DifferentialEvolution"),
+}
+
+
+def optimizer_named(name: str) -> Optimizer:
+    """The optimizer called ``name`` with its default options. Raises ArgumentError for an unknown name."""
+    if name not in OPTIMIZERS:
+        raise ArgumentError("optimizer", name, "auto or one of " + ", ".join(OPTIMIZERS))
+    module, attribute = OPTIMIZERS[name]
+    made: Optimizer = getattr(importlib.import_module(module), attribute)()
+    return made
+
+
+def automatic(objective: Objective) -> str:
+    """Name of the optimizer that suits an objective best.
+
+    The lattice where it is exact by construction; otherwise the swarm, which asks nothing of the objective.
+    """
+    if hasattr(objective, "affine_part") and not objective.constrained:
+        return "lattice"
+    return "pso" if Capability.BATCH in objective.provides else "differential-evolution"
+
+
+def minimize(objective: Objective | Callable[[Any], Any], bounds: ArrayLike, *,
+             optimizer: str | Optimizer = "auto", x0: ArrayLike | None = None, seed: int = 0,
+             budget: Budget | None = None) -> OptimizeResult:
+    """Minimise an objective, or a plain function, inside ``bounds`` (d, 2).
+
+    A function may map one candidate (d,) to a number, or a batch (n, d) to (n,). ``optimizer`` is a name
+    (see ``OPTIMIZERS``), an optimizer with options, or "auto", which says in the message what it took. The
+    same ``seed`` and a budget in evaluations give the same bits. Raises ArgumentError for bad input.
+    """
+    box = checked_bounds(bounds)
+    problem = as_objective(objective, box)
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise ArgumentError("seed", seed, "a whole number >= 0")
+    chosen = automatic(problem) if optimizer == "auto" else optimizer
+    method = optimizer_named(chosen) if isinstance(chosen, str) else chosen
+    missing = method.needs - problem.provides
+    if missing:
+        raise ArgumentError("optimizer", method.name, "an optimizer that works without " + ", ".join(
+            sorted(c.name.lower() for c in missing)) + ", which this objective does not offer")
+    return method.minimize(problem, box, x0=x0, rng=np.random.default_rng(seed), budget=budget or Budget())
