@@ -19,8 +19,8 @@ class Acceleration:
 
     The speed is v = p s' with p = |(twist_x, twist_y)|, so v' = p s'' + (d . acceleration_rate) s'^2 with
     d the direction of travel in the body frame: exactly linear, and equal to s'' where the robot drives along
-    its heading. Centripetal acceleration does not count (that is what ``Slip`` is for), and a turn on the spot
-    is not bounded (that is what ``WheelAcceleration`` is for).
+    its heading. Centripetal acceleration does not count (that is what ``Slip`` is for), and a turn on the
+    spot is not bounded (that is what ``WheelAcceleration`` is for).
     Raises ArgumentError unless both are > 0.
     """
 

@@ -97,4 +97,4 @@ def _distribution(body: Body, driven: NDArray[np.bool_], plain: NDArray[np.bool_
     wrench: Array = np.array(columns, dtype=np.float64).T
     if np.linalg.matrix_rank(wrench, tol=1e-9) < 3:
         raise ArgumentError("robot.body", body.contacts, "driven contacts that can push along x, y and turn")
-    return np.linalg.pinv(wrench)
+    return np.asarray(np.linalg.pinv(wrench), dtype=np.float64)

@@ -1,0 +1,49 @@
+"""Time-optimal profile by our own reachability analysis, compiled by numba (timing/kernel.py)."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.timing.feasibility import empty_set, require_bounded, require_end_speed, require_start_speed
+from trajopt.timing.stages import SD2_CAP, Stages
+
+Array = NDArray[np.float64]
+
+
+def is_compiled() -> bool:
+    """Whether numba is installed; without it the same functions run interpreted, slowly."""
+    return find_spec("numba") is not None
+
+
+def compiled_profile(stages: Stages, start: float, end: float) -> Array:
+    """(G,) s'^2 of the fastest profile with s'^2 = ``start`` and ``end`` at the ends.
+
+    Raises InfeasibleError naming limit and place.
+    """
+    from trajopt.timing import kernel
+
+    require_end_speed(stages, end)
+    sets = controllable_sets(stages, end, end)
+    require_start_speed(stages, start, sets)
+    require_bounded(stages, sets)
+    sd2 = np.empty(len(stages.s))
+    kernel.fastest(stages.s, stages.a, stages.b, stages.c, sets, min(max(start, sets[0, 0]), sets[0, 1]), sd2)
+    return sd2
+
+
+def controllable_sets(stages: Stages, lowest: float, highest: float) -> Array:
+    """(G, 2) least and greatest s'^2 at each gridpoint from which the end is reached in [lowest, highest].
+
+    Raises InfeasibleError naming limit and place when a set is empty.
+    """
+    from trajopt.timing import kernel
+
+    sets = np.empty((len(stages.s), 2))
+    sets[-1] = lowest, min(highest, float(stages.sd2_max[-1]), SD2_CAP)
+    failed = kernel.controllable(stages.s, stages.a, stages.b, stages.c, stages.sd2_max, sets)
+    if failed >= 0:
+        raise empty_set(stages, int(failed), sets)
+    return sets

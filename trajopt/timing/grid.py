@@ -1,0 +1,83 @@
+"""Gridpoints of time scaling: spline parameters u with every knot among them.
+
+The third derivative of a cubic spline jumps at knots, and with it every row that holds it (wheel
+acceleration). Each knot is therefore sampled twice, as the limit from the left and from the right; an
+interval between gridpoints uses the limits that belong to it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.paths.path import Path
+
+Array = NDArray[np.float64]
+
+_CELLS = 400  # intervals on a path when the caller does not say; chosen: refinement adds what is missing
+_CELLS_PER_SEGMENT = 20  # at least this many on a spline segment; chosen
+_MERGE = 1e-12  # gridpoints closer than this share of the path's length are one
+
+
+def initial_grid(path: Path, gridpoints: int | ArrayLike | None) -> Array:
+    """Spline parameters (N+1,) of the gridpoints, increasing, all knots among them.
+
+    ``gridpoints``: None (chosen here), how many, or path parameters s in [0, length], m.
+    Raises ArgumentError for fewer than two, or places off the path.
+    """
+    knots = np.asarray(path.basis.knots)
+    spans = np.diff(path.knot_parameters)
+    if gridpoints is None:
+        cells = np.maximum(_CELLS_PER_SEGMENT, np.ceil(_CELLS * spans / spans.sum()))
+    elif isinstance(gridpoints, (int, np.integer)):
+        if gridpoints < 2:
+            raise ArgumentError("gridpoints", gridpoints, "2 or more gridpoints")
+        cells = np.maximum(1, np.round((gridpoints - 1) * spans / spans.sum()))
+    else:
+        places = np.asarray(gridpoints, dtype=np.float64)
+        tolerance = 1e-9 * path.length
+        if places.ndim != 1 or not np.all((places >= -tolerance) & (places <= path.length + tolerance)):
+            raise ArgumentError("gridpoints", places.tolist(), f"path parameters in [0, {path.length:.6g}] m")
+        return insert(path, knots, places)
+    s0 = path.knot_parameters
+    steps = [a + h * np.arange(1, int(n)) / n for a, h, n in zip(s0[:-1], spans, cells, strict=True)]
+    return insert(path, knots, np.concatenate(steps))
+
+
+def insert(path: Path, u: Array, places: Array) -> Array:
+    """Grid u with gridpoints added at path parameters ``places``; those that are there already merge."""
+    inside = places[(places > 0) & (places < path.length)]
+    if not len(inside):
+        return u
+    new = path.locate(inside)
+    merge = _MERGE * (path.end - path.start)
+    near = np.abs(u[np.clip(np.searchsorted(u, new), 1, len(u) - 1)[:, None] - [[1, 0]]] - new[:, None])
+    new = np.sort(new[near.min(axis=1) > merge])
+    new = new[np.concatenate([[True], np.diff(new) > merge])] if len(new) else new
+    return np.sort(np.concatenate([u, new]))
+
+
+def split(u: Array, where: NDArray[np.bool_], parts: int) -> Array:
+    """Grid with the intervals ``where`` (N,) cut into ``parts`` equal ones."""
+    fractions = np.arange(1, parts) / parts
+    new = u[:-1][where, None] + (u[1:] - u[:-1])[where, None] * fractions
+    return np.sort(np.concatenate([u, new.ravel()]))
+
+
+def with_left_limits(path: Path, u: Array) -> Array:
+    """Gridpoints (G,) with every inner knot twice: its left limit (the float before it) and itself."""
+    inner = np.asarray(path.basis.knots[1:-1])
+    return np.sort(np.concatenate([u, np.nextafter(inner, -np.inf)])) if len(inner) else u
+
+
+def fine_grid(u: Array, factor: int = 10) -> Array:
+    """(N, factor + 1): spline parameters inside every interval, ends included, ``factor`` times finer.
+
+    The right end of an interval is the limit from the left.
+    """
+    fractions = np.arange(factor + 1) / factor
+    fine = u[:-1, None] + (u[1:] - u[:-1])[:, None] * fractions
+    fine[:, 0] = u[:-1]
+    fine[:, -1] = np.nextafter(u[1:], -np.inf)
+    return np.asarray(fine)

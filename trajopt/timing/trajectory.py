@@ -1,0 +1,136 @@
+"""A timed motion along a path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.limits.limit import Limit
+from trajopt.paths.path import Path
+from trajopt.paths.samples import sample_at
+from trajopt.robots.platform import Platform
+from trajopt.timing.stages import Check, check
+from trajopt.timing.wheels import WheelTable, wheel_table
+from trajopt.world.terrain import Terrain
+
+Array = NDArray[np.float64]
+
+_BINDS = 2e-3  # relative margin below which a limit counts as binding; above the largest slow-down (0.1 %)
+_ON_TIME = 1e-12  # share of the duration by which a time may lie outside through rounding
+
+
+class Stretch(NamedTuple):
+    """Between path parameters ``start`` and ``end`` (m) the limit named ``limit`` binds."""
+
+    start: float
+    end: float
+    limit: str
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Robot state at N times. Poses are (x, y, yaw) in the world, twists (vx, vy, wz) in the body frame."""
+
+    pose: Array  # (N, 3) m, m, rad (yaw continuous along the path)
+    twist: Array  # (N, 3) m/s, m/s, rad/s
+    wheel_angles: Array  # (N, W) rad, from 0 at the start; W = 0 without a robot
+    wheel_speeds: Array  # (N, W) rad/s
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A path with a speed profile: s'' is constant between gridpoints, so s'^2 is linear in s there.
+
+    ``slowdown`` >= 1 is the factor by which the whole motion was slowed uniformly, after the solver, so that
+    the limits hold between gridpoints as well. ``engine`` says what computed it.
+    """
+
+    path: Path
+    limits: tuple[Limit, ...]
+    robot: Platform | None
+    terrain: Terrain
+    u: Array  # (N+1,) spline parameter at the gridpoints
+    s: Array  # (N+1,) path parameter at the gridpoints, m
+    sd: Array  # (N+1,) path speed, m/s
+    sdd: Array  # (N,) path acceleration after each gridpoint, m/s^2
+    engine: str
+    slowdown: float
+
+    @cached_property
+    def times(self) -> Array:
+        """(N+1,): times at the gridpoints, s."""
+        return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:]))])
+
+    @property
+    def duration(self) -> float:
+        """Duration, s."""
+        return float(self.times[-1])
+
+    def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0, duration]."""
+        time = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        slack = _ON_TIME * self.duration
+        if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
+            raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
+        i = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.sdd) - 1)
+        after = np.clip(time - self.times[i], 0.0, None)
+        s = self.s[i] + after * (self.sd[i] + after * self.sdd[i] / 2)
+        speed = np.maximum(self.sd[i] + self.sdd[i] * after, 0.0)
+        return np.clip(s, self.s[i], self.s[i + 1]), speed, self.sdd[i]
+
+    def at(self, t: ArrayLike) -> State:
+        """State at times t (N,) or one time (N = 1), s. Raises ArgumentError outside [0, duration]."""
+        s, speed, _ = self.along(t)
+        u = self.path.locate(s)
+        samples = sample_at(self.path, s, u)
+        table_u, table_yaw = self._yaw_table
+        turns = np.round((np.interp(u, table_u, table_yaw) - samples.yaw) / (2 * np.pi))
+        pose = np.column_stack([samples.position[:, :2], samples.yaw + 2 * np.pi * turns])
+        twist = samples.twist * speed[:, None]
+        if self.robot is None or self._wheels is None:
+            none = np.zeros((len(s), 0))
+            return State(pose, twist, none, none)
+        return State(pose, twist, self._wheels.at(u), twist @ self.robot.inverse.T)
+
+    def margins(self) -> Mapping[str, float]:
+        """Least relative margin of every limit, recomputed on a grid ten times finer than the solver's."""
+        least = self._check.slack.min(axis=0)
+        return MappingProxyType({limit.name: float(m) for limit, m in zip(self.limits, least, strict=True)})
+
+    @cached_property
+    def binding(self) -> tuple[str, ...]:
+        """(N,): name of the limit that binds in each interval between gridpoints, "" where none does."""
+        slack = self._check.slack
+        least = np.argmin(slack, axis=1)
+        tight = slack[np.arange(len(slack)), least] < _BINDS
+        return tuple(self.limits[k].name if t else "" for k, t in zip(least, tight, strict=True))
+
+    @cached_property
+    def active(self) -> tuple[Stretch, ...]:
+        """Stretches of the path with the limit that binds there; where none binds there is no stretch."""
+        names = np.array(self.binding)
+        starts = np.flatnonzero(np.concatenate([[True], names[1:] != names[:-1]]))
+        ends = np.append(starts[1:], len(names))
+        return tuple(Stretch(float(self.s[i]), float(self.s[j]), str(names[i]))
+                     for i, j in zip(starts, ends, strict=True) if names[i])
+
+    @cached_property
+    def _check(self) -> Check:
+        return check(self.path, self.u, self.sd**2, self.sdd, self.limits, self.robot)
+
+    @cached_property
+    def _wheels(self) -> WheelTable | None:
+        return None if self.robot is None else wheel_table(self.path, self.robot)
+
+    @cached_property
+    def _yaw_table(self) -> tuple[Array, Array]:
+        """Continuous yaw at spline parameters close enough to tell the turn."""
+        u = np.linspace(self.path.start, self.path.end, 256 * (len(self.path.basis.knots) - 1) + 1)
+        return u, self.path.yaw(u)
