@@ -44,11 +44,17 @@ def exact_terminal(basis: SplineBasis, kinematics: Kinematics, actuator: Actuato
     """
     speed = (basis.knots[-1] - basis.knots[0]) / duration
 
+    knots = np.asarray(basis.knots)
+    cubics = basis.polynomials(np.column_stack([x, y, yaw]))
+
     def body(u: Array) -> tuple[Array, Array, Array, Array]:
-        value, rate = basis.matrix(u), basis.matrix(u, 1)
-        angle, dx, dy = value @ yaw, rate @ x * speed, rate @ y * speed
+        """Heading and body twist at spline parameters u (n,)."""
+        i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
+        t, (a, b, c, d) = (u - knots[i])[:, None], cubics[i].transpose(1, 0, 2)
+        rate = ((3.0 * d * t + 2.0 * c) * t + b) * speed
+        angle = ((d[:, 2] * t[:, 0] + c[:, 2]) * t[:, 0] + b[:, 2]) * t[:, 0] + a[:, 2]
         cos, sin = np.cos(angle), np.sin(angle)
-        return angle, cos * dx + sin * dy, cos * dy - sin * dx, rate @ yaw * speed
+        return (angle, cos * rate[:, 0] + sin * rate[:, 1], cos * rate[:, 1] - sin * rate[:, 0], rate[:, 2])
 
     def wheel_speeds(u: Array) -> Array:
         _, vx, vy, wz = body(u)

@@ -111,7 +111,7 @@ def lattice_points(part: AffinePart, box: Array) -> tuple[Array, Array]:
     """All exact solutions (n, k) inside ``box`` (k, 2), and their whole turns (n, c).
 
     With as many variables as critical wheels these are all there are; with more, for each set of turns the
-    solution nearest to the base point (scaled by the box) is taken, kept inside the box where possible.
+    solution nearest to the base point (scaled by the box) is taken.
     """
     rows = _independent_rows(part.matrix)
     matrix, offset = part.matrix[rows], part.offset[rows]
@@ -146,13 +146,13 @@ def _independent_rows(matrix: Array) -> list[int]:
 def _least_change(matrix: Array, targets: Array, base: Array, box: Array) -> Array:
     """(n, k): for each target (n, c), the solution of matrix @ z = target nearest to ``base``.
 
-    Variables that fall outside the box are held at its border and the others solved again, so a returned
-    row may miss its target: then no solution was found inside.
+    Rows without a solution inside the box are inf. Only where no target has its nearest solution inside,
+    variables that fall outside are held at the border and the others solved again.
     """
     width = box[:, 1] - box[:, 0]
     points = base + (targets - matrix @ base) @ np.linalg.pinv(matrix * width).T * width
     inside = np.all((points >= box[:, 0]) & (points <= box[:, 1]), axis=1)
-    if matrix.shape[1] == matrix.shape[0]:
+    if matrix.shape[1] == matrix.shape[0] or inside.any():
         return np.where(inside[:, None], points, np.inf)
     for i in np.flatnonzero(~inside):
         points[i] = _held_inside(matrix, targets[i], points[i], box, width)

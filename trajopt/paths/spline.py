@@ -96,6 +96,15 @@ class SplineBasis:
         result += weights[0] * m[i] + weights[1] * m[i + 1]
         return result
 
+    def polynomials(self, values: Array) -> Array:
+        """(K - 1, 4, ...): coefficients of 1, t, t^2, t^3 on each segment, t counted from its left knot.
+
+        ``values`` (size, ...) are control values. For repeated evaluation; the same spline as ``matrix``.
+        """
+        left = self._knots[:-1]
+        parts = [self.matrix(left, k) @ values / f for k, f in ((0, 1.0), (1, 1.0), (2, 2.0), (3, 6.0))]
+        return np.stack(parts, axis=1)
+
 
 def uniform_basis(points: int) -> SplineBasis:
     """Natural spline on knots 1, 2, ..., ``points``: thesis 000's parametrisation for four points."""
