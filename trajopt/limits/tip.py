@@ -21,7 +21,7 @@ class Tip:
     """No tipping fore, aft or sideways; ``reserve`` (m) keeps the zero-moment point that far inside.
 
     The load on the far side of every edge of the support polygon (the convex hull of the contacts) stays
-    >= 0: h n . (f_x, f_y) <= d f_z, with n the outward normal of the edge and d its distance from the
+    >= 0: -h n . (f_x, f_y) <= d f_z, with n the outward normal of the edge and d its distance from the
     foot of the centre of gravity. For two axles these are N_A >= 0, N_B >= 0 and h |f_y| <= w f_z
     (SOURCES 004). One row an edge; contact with the ground (f_z >= 0) follows from them.
     Raises ArgumentError for a reserve < 0, a centre of gravity outside the support, or no robot.
@@ -41,7 +41,7 @@ class Tip:
         if np.any(distances <= 0):
             raise ArgumentError(f"{self.name}: robot.body.cog", body.cog,
                                 f"a centre of gravity more than {self.reserve} m inside the support polygon")
-        lever = np.column_stack([normals * (body.cog[2] / distances)[:, None], -np.ones(len(normals))])
+        lever = np.column_stack([-normals * (body.cog[2] / distances)[:, None], -np.ones(len(normals))])
         value = specific_force(path, body).through(lever)
         return linear_rows(self.name, value.a, value.b, -value.c, STANDARD_GRAVITY)
 

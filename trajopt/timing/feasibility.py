@@ -30,9 +30,13 @@ def empty_set(stages: Stages, failed: int, sets: Array) -> InfeasibleError:
     alone = not _feasible(stages, failed, free, None)
     after = free if alone else sets[failed + 1]
     cures = [name for k, name in enumerate(stages.names) if _feasible(stages, failed, after, k)]
+    broken = stages.c[failed : failed + 2].min(axis=0) < 0
+    at_rest = {stages.names[k] for k in stages.row_owner[broken]}  # limits that standing still breaks
+    cures.sort(key=lambda name: name not in at_rest)
     limit = cures[0] if cures else _least_slack_at_rest(stages, failed)
-    if alone and np.any(stages.c[failed : failed + 2] < 0):
-        reason = "no speed keeps it here, and standing still breaks it (slope, friction or centre of gravity)"
+    if limit in at_rest:
+        reason = ("standing still breaks it (slope, friction or centre of gravity), and no speed that the "
+                  "other limits allow helps")
     elif alone:
         reason = "no speed keeps all limits here"
     else:
