@@ -17,18 +17,42 @@ if TYPE_CHECKING:
         SimulationError,
         TrajoptError,
     )
+    from trajopt.optimize.base import Budget, OptimizeResult, Status
+    from trajopt.optimize.search import minimize
     from trajopt.paths.path import Path
+    from trajopt.pipeline import Solution, solve, validate
+    from trajopt.problem import Problem, load_problem
+    from trajopt.simulate.check import ValidationReport
+    from trajopt.timing.scaling import time_scale
+    from trajopt.timing.trajectory import State, Trajectory
+    from trajopt.world.terrain import Flat, Step
 
 __version__ = "0.1.0"
 
+# public name -> the module it lives in
 _HOME = {
     "ArgumentError": "trajopt.errors",
+    "Budget": "trajopt.optimize.base",
+    "Flat": "trajopt.world.terrain",
     "InfeasibleError": "trajopt.errors",
     "MissingDependencyError": "trajopt.errors",
+    "OptimizeResult": "trajopt.optimize.base",
+    "Path": "trajopt.paths.path",
+    "Problem": "trajopt.problem",
     "ProblemError": "trajopt.errors",
     "SimulationError": "trajopt.errors",
+    "Solution": "trajopt.pipeline",
+    "State": "trajopt.timing.trajectory",
+    "Status": "trajopt.optimize.base",
+    "Step": "trajopt.world.terrain",
+    "Trajectory": "trajopt.timing.trajectory",
     "TrajoptError": "trajopt.errors",
-    "Path": "trajopt.paths.path",
+    "ValidationReport": "trajopt.simulate.check",
+    "load_problem": "trajopt.problem",
+    "minimize": "trajopt.optimize.search",
+    "solve": "trajopt.pipeline",
+    "time_scale": "trajopt.timing.scaling",
+    "validate": "trajopt.pipeline",
 }
 
 __all__ = sorted(_HOME)  # noqa: PLE0605

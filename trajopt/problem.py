@@ -18,6 +18,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pydantic_core import PydanticCustomError
 
 from trajopt.errors import ProblemError
+from trajopt.limits.acceleration import Acceleration
+from trajopt.limits.limit import Limit
+from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
+from trajopt.limits.tip import Tip
+from trajopt.limits.wheel_acceleration import WheelAcceleration
+from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.limits.yaw_rate import YawRate
 
 WheelName = Literal["front-left", "front-right", "rear-left", "rear-right"]
 WHEELS: tuple[WheelName, ...] = ("front-left", "front-right", "rear-left", "rear-right")
@@ -114,7 +122,8 @@ class ObjectiveSection(_Section):
         (3.0, 0.125, 2.5), description="on |dx|, |dy| (1/m), |dyaw| (1/rad): Table 5.8")
     wheel_gain: NonNegative = Field(12.5, description="on each critical wheel's deviation, 1/rad: Table 5.8")
     wheel_period: Literal["2pi", "pi"] = Field("2pi", description="2pi: the tables; pi: hubs half a turn apart")
-    wheel_tolerance: Positive = Field(1e-3, description="rad; 'duration' holds wheel deviations within it")
+    wheel_tolerance: Positive = Field(1e-3, description="rad; a solution holds within it; chosen")
+    pose_tolerance: Positive = Field(1e-3, description="m and rad; a solution holds within it; chosen")
 
     @property
     def period(self) -> float:
@@ -147,6 +156,20 @@ class Limits(_Section):
     wheel_acceleration: Positive | None = Field(None, description="rad/s^2")
     friction: Positive | None = Field(None, description="friction coefficient for the slip limit")
     tip: bool = Field(False, description="keep every wheel on the ground")
+
+    def as_limits(self) -> tuple[Limit, ...]:
+        """The limits that are given, as time scaling takes them."""
+        found: list[Limit] = []
+        for name, make in (("speed", Speed), ("yaw_rate", YawRate), ("wheel_speed", WheelSpeed),
+                           ("wheel_acceleration", WheelAcceleration), ("friction", Slip)):
+            value = getattr(self, name)
+            if value is not None:
+                found.append(make(value))
+        if self.acceleration is not None and self.deceleration is not None:
+            found.append(Acceleration(self.acceleration, self.deceleration))
+        if self.tip:
+            found.append(Tip())
+        return tuple(found)
 
 
 class Scene(_Section):
@@ -183,6 +206,13 @@ class Problem(_Section):
         if (self.limits.acceleration is None) != (self.limits.deceleration is None):
             raise _rule("limits.deceleration", self.limits.deceleration,
                         "acceleration and deceleration both given or both left out")
+        if self.objective.kind == "duration" and self.actuator.enabled:
+            raise _rule("actuator.enabled", True, "false with objective.kind = \"duration\": a time-scaled "
+                        "motion keeps wheel speeds within limits, so no actuator saturates")
+        if self.objective.kind == "duration" and "duration" in self.spline.free:
+            raise _rule("spline.free", list(self.spline.free), "no duration: time scaling chooses it")
+        if not self.limits.as_limits():
+            raise _rule("limits", {}, "at least one limit")
         return self
 
     def replace(self, changes: Mapping[str, Any] | None = None, /, **sections: Any) -> Problem:

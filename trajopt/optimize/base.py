@@ -28,6 +28,9 @@ DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, thesis 000 Table 
 _KEPT_SAMPLES = 50_000  # explored candidates kept for pictures
 
 
+Progress = Callable[[int, float], None]  # called with evaluations used and the best cost
+
+
 class Status(Enum):
     """Why a search ended, and what to do about it."""
 
@@ -104,7 +107,7 @@ class Optimizer(Protocol):
     stochastic: ClassVar[bool]
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget) -> OptimizeResult: ...
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult: ...
 
 
 class _Stop(Exception):  # noqa: N818 - control flow inside a run, never seen by users
@@ -119,6 +122,7 @@ class Run:
     objective: Objective
     bounds: Array
     budget: Budget
+    on_progress: Progress | None = None
     nfev: int = 0
     nit: int = 0
     failures: int = 0
@@ -126,7 +130,6 @@ class Run:
     best_x: Array | None = None
     best_cost: float = np.inf
     best_violation: float = np.inf
-    on_progress: Callable[[int, float], None] | None = None
     _proposals: list[Array] = field(default_factory=list)
     _rows: list[tuple[int, float, float, float]] = field(default_factory=list)
     _samples: list[Array] = field(default_factory=list)

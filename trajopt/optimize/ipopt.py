@@ -24,7 +24,7 @@ from trajopt.objectives.base import (
     SymbolicObjective,
     SymbolicProblem,
 )
-from trajopt.optimize.base import Budget, OptimizeResult, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
 from trajopt.optimize.lattice import EXACT, lattice_points
 from trajopt.optimize.newton import solve_residuals
 
@@ -52,12 +52,12 @@ class Ipopt:
     stop_when_exact: bool = True
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget) -> OptimizeResult:
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Search. ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the history, and
         the polish. Raises ArgumentError when the objective cannot be written in symbols."""
         box = checked_bounds(bounds, objective.dimension)
         start = checked_x0(x0, box)
-        run = Run(objective, box, budget)
+        run = Run(objective, box, budget, progress)
         program = _Program.of(self, run, cast(SymbolicObjective, objective))
         return run.finish(self.name, lambda: self._search(run, program, start, rng))
 

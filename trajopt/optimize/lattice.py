@@ -17,12 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, LatticeObjective, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Run, Status, checked_bounds
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds
 from trajopt.optimize.newton import solve_residuals
 
 Array = NDArray[np.float64]
 
-EXACT = 1e-9  # cost up to which a solution counts as exact
+EXACT = 1e-9  # cost, or wheel error in rad, up to which a solution counts as exact
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Lattice:
     rounds: int = 5  # chosen
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget) -> OptimizeResult:
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Solve. ``x0`` is not used: the method needs no start. ``rng`` draws base points for later rounds.
 
         Raises ArgumentError for an objective without an affine part.
@@ -49,7 +49,7 @@ class Lattice:
             raise ArgumentError("optimizer", self.name, "an objective with affine wheel angles (the terminal "
                                                         "objective); take pso or differential-evolution here")
         box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget)
+        run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self._search(run, cast(LatticeObjective, objective), rng))
 
     def _search(self, run: Run, objective: LatticeObjective, rng: Generator) -> tuple[Status, str]:
@@ -64,11 +64,12 @@ class Lattice:
         candidates, turns = candidates[order], turns[order]
         if Capability.AFFINE in objective.provides:
             run.nit = 1
-            cost = run.evaluate(candidates).cost
+            run.evaluate(candidates)
             run.propose(candidates[0])
-            if cost[0] <= EXACT:
+            misses = candidates[:, part.variables] @ part.matrix.T + part.offset - part.period * turns
+            if np.max(np.abs(misses[0])) <= EXACT:
                 return Status.CONVERGED, f"{len(points)} exact solutions inside the bounds, the one with the " \
-                                         f"lowest peak wheel rate taken"
+                                         f"least effort taken"
             return Status.NO_EXACT, "the critical wheels over-determine the control points"
         return self._through_actuators(run, objective, part, candidates, turns, rng)
 

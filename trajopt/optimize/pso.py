@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import FEASIBLE, Budget, OptimizeResult, Run, Status, best_index, checked_bounds, checked_x0
+from trajopt.optimize.base import FEASIBLE, Budget, OptimizeResult, Progress, Run, Status, best_index, checked_bounds, checked_x0
 
 Array = NDArray[np.float64]
 
@@ -55,10 +55,10 @@ class ParticleSwarm:
             raise ArgumentError("start", self.start, "uniform or grid")
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget) -> OptimizeResult:
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Search until the budget ends. ``x0`` (d,) becomes the first particle's position."""
         box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget)
+        run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self.search(run, checked_x0(x0, box), rng))
 
     def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:

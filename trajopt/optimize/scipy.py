@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
 
 Array = NDArray[np.float64]
 
@@ -59,14 +59,14 @@ class ScipyLocal:
         return self.method.lower()
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget) -> OptimizeResult:
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Search from each start in turn. Raises ArgumentError for a constrained objective where the method
         knows only bounds (l-bfgs-b, nelder-mead)."""
         if objective.constrained and self.method in ("L-BFGS-B", "Nelder-Mead"):
             raise ArgumentError("optimizer", self.name, "a method that handles constraints for this objective: "
                                 "pso, differential-evolution, slsqp or trust-constr")
         box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget)
+        run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
 
     def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
@@ -102,10 +102,10 @@ class DifferentialEvolution:
     tolerance: float = 1e-12  # SciPy's tol on the population's spread; tight, because budgets end searches
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget) -> OptimizeResult:
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Search until the population has collapsed or the budget ends, then SciPy's local polish."""
         box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget)
+        run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
 
     def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:

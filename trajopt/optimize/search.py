@@ -43,19 +43,21 @@ def automatic(objective: Objective) -> str:
 
     The lattice where it is exact by construction; otherwise the swarm, which asks nothing of the objective.
     """
-    if hasattr(objective, "affine_part") and not objective.constrained:
+    if hasattr(objective, "affine_part"):
         return "lattice"
     return "pso" if Capability.BATCH in objective.provides else "differential-evolution"
 
 
 def minimize(objective: Objective | Callable[[Any], Any], bounds: ArrayLike, *,
              optimizer: str | Optimizer = "auto", x0: ArrayLike | None = None, seed: int = 0,
-             budget: Budget | None = None) -> OptimizeResult:
+             budget: Budget | None = None,
+             progress: Callable[[int, float], None] | None = None) -> OptimizeResult:
     """Minimise an objective, or a plain function, inside ``bounds`` (d, 2).
 
     A function may map one candidate (d,) to a number, or a batch (n, d) to (n,). ``optimizer`` is a name
     (see ``OPTIMIZERS``), an optimizer with options, or "auto", which says in the message what it took. The
-    same ``seed`` and a budget in evaluations give the same bits. Raises ArgumentError for bad input.
+    same ``seed`` and a budget in evaluations give the same bits. ``progress(evaluations, best_cost)`` is called
+    after every batch. Raises ArgumentError for bad input.
     """
     box = checked_bounds(bounds)
     problem = as_objective(objective, box)
@@ -67,4 +69,5 @@ def minimize(objective: Objective | Callable[[Any], Any], bounds: ArrayLike, *,
     if missing:
         raise ArgumentError("optimizer", method.name, "an optimizer that works without " + ", ".join(
             sorted(c.name.lower() for c in missing)) + ", which this objective does not offer")
-    return method.minimize(problem, box, x0=x0, rng=np.random.default_rng(seed), budget=budget or Budget())
+    return method.minimize(problem, box, x0=x0, rng=np.random.default_rng(seed),
+                           budget=budget or Budget(), progress=progress)

@@ -1,0 +1,110 @@
+"""Duration as the cost: the time that time scaling needs along the candidate path.
+
+Wheel angles at the end do not depend on timing, so they are a constraint here: the violation is what the
+critical wheels' deviations exceed their tolerance by. The lattice meets it exactly and picks the fastest
+solution; population methods handle it by Deb's rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import InfeasibleError
+from trajopt.objectives.base import AffinePart, Capability, Evaluation
+from trajopt.objectives.terminal import TerminalObjective, folded
+from trajopt.paths.path import Path
+from trajopt.timing.scaling import time_scale
+
+Array = NDArray[np.float64]
+
+SEARCH_GRIDPOINTS = 60  # of the time scaling inside a search; the score uses the full grid. Chosen
+
+
+@dataclass(frozen=True)
+class DurationObjective:
+    """Duration (s) over the free control values of ``terminal``'s problem, wheel angles as a constraint."""
+
+    terminal: TerminalObjective
+    gridpoints: int = SEARCH_GRIDPOINTS
+
+    @property
+    def dimension(self) -> int:
+        return self.terminal.dimension
+
+    @property
+    def bounds(self) -> Array:
+        return self.terminal.bounds
+
+    @property
+    def constrained(self) -> bool:
+        return True
+
+    @property
+    def provides(self) -> frozenset[Capability]:
+        offered = {Capability.BATCH, Capability.RESIDUALS}
+        return frozenset(offered | ({Capability.AFFINE} if self.terminal.is_affine else set()))
+
+    def path(self, candidate: Array) -> Path:
+        """The path through the control points of one candidate (d,)."""
+        return self.terminal.path(candidate)
+
+    def _duration(self, candidate: Array, gridpoints: int | None) -> float:
+        """Least duration, s; inf where the limits allow no motion along this path."""
+        problem = self.terminal.problem
+        try:
+            return time_scale(self.path(candidate), problem.limits.as_limits(), robot=self.terminal.robot,
+                              gridpoints=gridpoints).duration
+        except InfeasibleError:
+            return float(np.inf)
+
+    def _violation(self, candidates: Array) -> Array:
+        section = self.terminal.problem.objective
+        errors = self.terminal.wheel_errors(self.terminal.predict(candidates.T))
+        worst = np.max([np.abs(folded(np.asarray(e)[0], section.period)) for e in errors], axis=0)
+        return np.maximum(worst - section.wheel_tolerance, 0.0)
+
+    def evaluate(self, candidates: Array) -> Evaluation:
+        """Durations are computed only where the wheel angles are within tolerance: elsewhere Deb's rule
+        compares violations and the path length (m) stands in for the cost."""
+        candidates = np.asarray(candidates, dtype=np.float64)
+        violation = self._violation(candidates)
+        cost = [self._duration(row, self.gridpoints) if v == 0.0 else self.path(row).length
+                for row, v in zip(candidates, violation, strict=True)]
+        violation = np.where(np.isfinite(cost), violation, violation + 1.0)
+        return Evaluation(np.where(np.isfinite(cost), cost, 1e6), violation)
+
+    def score(self, candidate: Array) -> Evaluation:
+        violation = self._violation(candidate[None])
+        duration = self._duration(candidate, None)
+        if not np.isfinite(duration):
+            return Evaluation(np.array([1e6]), violation + 1.0)
+        return Evaluation(np.array([duration]), violation)
+
+    def terms(self, candidate: Array) -> dict[str, float]:
+        """Named terms of one candidate (d,): the duration in s."""
+        return {"duration": self._duration(candidate, None)}
+
+    # -- the lattice, through the terminal objective --------------------------------------------------
+
+    def affine_part(self) -> AffinePart:
+        return self.terminal.affine_part()
+
+    def effort(self, candidates: Array) -> Array:
+        """(n,): duration, s; ranks exact solutions."""
+        return np.array([self._duration(row, self.gridpoints) for row in candidates])
+
+    def residuals(self, z: Any, turns: Any, *, exact: bool = False) -> list[Any]:
+        return self.terminal.residuals(z, turns, exact=exact)
+
+    def residual_gains(self) -> Array:
+        return self.terminal.residual_gains()
+
+    def nearest_turns(self, candidates: Array) -> Array:
+        return self.terminal.nearest_turns(candidates)
+
+    def coarse(self) -> TerminalObjective:
+        return self.terminal.coarse()
