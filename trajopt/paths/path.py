@@ -98,7 +98,9 @@ class Path:
 
     def position(self, u: ArrayLike, derivative: int = 0) -> Array:
         """(N, 3): x, y, z (m) or their derivative with respect to u, at spline parameters (N,)."""
-        value = self.basis.matrix(np.asarray(u, dtype=np.float64), derivative) @ self.coordinates
+        value = self._evaluate(u, derivative)
+        if self.heading is not None:
+            value = value[:, :-1]
         return value if value.shape[1] == 3 else np.column_stack([value, np.zeros(len(value))])
 
     def yaw(self, u: ArrayLike, derivative: int = 0) -> Array:
@@ -107,7 +109,7 @@ class Path:
         With tangent heading, the angle is continuous along increasing ``u``.
         """
         if self.heading is not None:
-            return self.basis.matrix(np.asarray(u, dtype=np.float64), derivative) @ self.heading
+            return self._evaluate(u, derivative)[:, -1]
         d = self.position(u, 1)
         if derivative == 0:
             return np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
@@ -115,6 +117,34 @@ class Path:
             raise ArgumentError("derivative", derivative, "0 or 1 where yaw is the direction of travel")
         dd = self.position(u, 2)
         return np.asarray((d[:, 0] * dd[:, 1] - d[:, 1] * dd[:, 0]) / (d[:, 0] ** 2 + d[:, 1] ** 2))
+
+    @cached_property
+    def _cubics(self) -> tuple[Array, Array]:
+        """Knots (K,) and coefficients (K-1, 4, D) of each segment in powers of u - knot; heading comes last."""
+        values = self.coordinates
+        if self.heading is not None:
+            values = np.column_stack([values, self.heading])
+        knots = np.asarray(self.basis.knots, dtype=np.float64)
+        y, m, h = values[: len(knots)], self.basis.second_derivatives @ values, np.diff(knots)[:, None]
+        first = np.diff(y, axis=0) / h - h * (2 * m[:-1] + m[1:]) / 6
+        return knots, np.stack([y[:-1], first, m[:-1] / 2, np.diff(m, axis=0) / (6 * h)], axis=1)
+
+    def _evaluate(self, u: ArrayLike, derivative: int) -> Array:
+        """(N, D): derivative 0..3 at u, segment by segment; at a knot, of the segment to the right.
+
+        The same function as ``basis.matrix(u, derivative) @ values``, in a tenth of the time for many points.
+        """
+        if derivative not in (0, 1, 2, 3):
+            raise ArgumentError("derivative", derivative, "an order from 0 to 3")
+        knots, cubics = self._cubics
+        u = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(cubics) - 1)
+        t, c = (u - knots[i])[:, None], cubics[i]
+        if derivative == 0:
+            return np.asarray(c[:, 0] + t * (c[:, 1] + t * (c[:, 2] + t * c[:, 3])))
+        if derivative == 1:
+            return np.asarray(c[:, 1] + t * (2 * c[:, 2] + t * (3 * c[:, 3])))
+        return np.asarray(2 * c[:, 2] + 6 * t * c[:, 3] if derivative == 2 else 6 * c[:, 3])
 
     def rate(self, u: ArrayLike) -> Array:
         """(N,): ds/du, the speed of the path parameter along the spline parameter."""
