@@ -55,7 +55,30 @@ _HOME = {
     "validate": "trajopt.pipeline",
 }
 
-__all__ = sorted(_HOME)  # noqa: PLE0605
+__all__ = [
+    "ArgumentError",
+    "Budget",
+    "Flat",
+    "InfeasibleError",
+    "MissingDependencyError",
+    "OptimizeResult",
+    "Path",
+    "Problem",
+    "ProblemError",
+    "SimulationError",
+    "Solution",
+    "State",
+    "Status",
+    "Step",
+    "Trajectory",
+    "TrajoptError",
+    "ValidationReport",
+    "load_problem",
+    "minimize",
+    "solve",
+    "time_scale",
+    "validate",
+]
 
 
 def __getattr__(name: str) -> Any:

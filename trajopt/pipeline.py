@@ -120,7 +120,7 @@ def solve(problem: Problem, *, optimizer: str | Optimizer = "auto", seed: int = 
                      progress=progress)
     path = objective.path(found.x)
     trajectory, infeasible = _timed(terminal, path, found.x)
-    deviation, wheels = _final_deviation(terminal, found.x, path, trajectory)
+    deviation, wheels = _final_deviation(terminal, found.x, trajectory)
     return Solution(problem, objective, found, objective.terms(found.x), path, trajectory, infeasible, deviation,
                     wheels, _dead_zone_effect(problem, trajectory), time.perf_counter() - started)
 
@@ -146,8 +146,7 @@ def _timed(terminal: TerminalObjective, path: Path, x: Array) -> tuple[Trajector
         return None, error
 
 
-def _final_deviation(terminal: TerminalObjective, x: Array, path: Path,
-                     trajectory: Trajectory | None) -> tuple[Array, Array]:
+def _final_deviation(terminal: TerminalObjective, x: Array, trajectory: Trajectory | None) -> tuple[Array, Array]:
     """Final pose error (3,) and folded wheel deviations (W,), rad, of the motion as it will be driven."""
     problem = terminal.problem
     if terminal.actuator.is_ideal and trajectory is not None:

@@ -65,7 +65,7 @@ class DurationObjective:
         section = self.terminal.problem.objective
         errors = self.terminal.wheel_errors(self.terminal.predict(candidates.T))
         worst = np.max([np.abs(folded(np.asarray(e)[0], section.period)) for e in errors], axis=0)
-        return np.maximum(worst - section.wheel_tolerance, 0.0)
+        return np.asarray(np.maximum(worst - section.wheel_tolerance, 0.0))
 
     def evaluate(self, candidates: Array) -> Evaluation:
         """Durations are computed only where the wheel angles are within tolerance: elsewhere Deb's rule

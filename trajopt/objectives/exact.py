@@ -36,8 +36,9 @@ _TO_NODES = _integration_matrix()
 
 def exact_terminal(basis: SplineBasis, kinematics: Kinematics, actuator: Actuator, x: Array, y: Array,
                    yaw: Array, duration: float, cells: int = 60) -> Terminal:
-    """Final state of one motion (natural spline, control values (K,)) executed at uniform spline speed in ``duration`` s.
+    """Final state of one motion executed at uniform spline speed in ``duration`` s.
 
+    ``x``, ``y`` (m) and ``yaw`` (rad) are the control values (K,) of a natural spline.
     ``cells`` equal cells are cut further at every crossing of a wheel's speed with +-saturation and
     +-dead-zone; two crossings of one wheel inside one cell stay unseen, so keep cells well below the
     number of oscillations of the wheel speeds.

@@ -110,7 +110,7 @@ class Optimizer(Protocol):
                  rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult: ...
 
 
-class _Stop(Exception):  # noqa: N818 - control flow inside a run, never seen by users
+class _Stop(Exception):
     def __init__(self, status: Status) -> None:
         self.status = status
 

@@ -39,7 +39,7 @@ class Lattice:
 
     rounds: int = 5  # chosen
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,  # noqa: ARG002
                  rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Solve. ``x0`` is not used: the method needs no start. ``rng`` draws base points for later rounds.
 
@@ -76,7 +76,7 @@ class Lattice:
     def _through_actuators(self, run: Run, objective: LatticeObjective, part: AffinePart, candidates: Array,
                            turns: Array, rng: Generator) -> tuple[Status, str]:
         """Newton from each lattice point, then from lattice points of other base points."""
-        for attempt in range(self.rounds):
+        for _ in range(self.rounds):
             for x, k in zip(candidates, turns, strict=True):
                 run.nit += 1
                 outcome = solve_residuals(run, objective, x, k)
@@ -84,8 +84,10 @@ class Lattice:
                 run.propose(outcome.x)
                 if outcome.solved:
                     return Status.CONVERGED, f"exact through the actuators after {run.nit} Newton solves"
-            base = run.bounds.mean(axis=1) + (rng.random(len(run.bounds)) - 0.5) * (run.bounds[:, 1] - run.bounds[:, 0]) * 0.8
-            base = np.where(np.isin(np.arange(len(base)), part.variables), base, 0.75 * part.base + 0.25 * base)
+            width = run.bounds[:, 1] - run.bounds[:, 0]
+            base = run.bounds.mean(axis=1) + 0.8 * width * (rng.random(len(width)) - 0.5)
+            point = np.isin(np.arange(len(base)), part.variables)
+            base = np.where(point, base, 0.75 * part.base + 0.25 * base)  # heading stays near the linear one
             points, turns = lattice_points(replace(part, base=base), run.bounds[part.variables])
             candidates = np.tile(base, (len(points), 1))
             candidates[:, part.variables] = points
@@ -198,4 +200,4 @@ def _arrangement_vertices(part: AffinePart, box: Array) -> Array:
                 points = np.tile(end, (len(turns), 1))
                 points[:, axis] += (turns * part.period - a) / row[axis]
                 found.append(points)
-    return np.clip(np.concatenate(found), box[:, 0], box[:, 1])
+    return np.asarray(np.clip(np.concatenate(found), box[:, 0], box[:, 1]))

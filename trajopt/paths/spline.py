@@ -65,7 +65,7 @@ class SplineBasis:
             left[-1, -2:] = h[-1] / 6, h[-1] / 3
             right[-1, k - 2 : k] = 1 / h[-1], -1 / h[-1]
             right[-1, n - 1] += 1.0
-        return np.linalg.solve(left, right)
+        return np.asarray(np.linalg.solve(left, right))
 
     def matrix(self, u: Array, derivative: int = 0) -> Array:
         """(N, size): the spline's derivative of order 0..3 at parameters ``u`` (N,) = matrix @ values.

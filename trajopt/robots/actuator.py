@@ -19,7 +19,6 @@ import numpy as np
 
 from trajopt.errors import ArgumentError
 
-
 SMALL_SPAN = 1e-9  # rad/s; a step with less change of speed is taken as constant
 
 

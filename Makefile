@@ -1,0 +1,44 @@
+# Everything a fresh machine needs: Python 3.11 and make.
+PYTHON ?= python3.11
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/ready
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-all check format schema pictures clean
+
+help:  ## what the targets do
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /  -  /'
+
+$(READY): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[simulate,speed,sweep,optimizers,dev]'
+	touch $@
+
+demo: $(READY)  ## solve Table 5.3 and Scenario 1 forward35, check both in pybullet, write out/demo/
+	$(BIN)/trajopt solve problems/smdw/table_5_3.toml --out out/demo/table_5_3
+	$(BIN)/trajopt validate out/demo/table_5_3 --engine pybullet
+	$(BIN)/trajopt solve problems/smdw/scenario_1_forward35.toml --out out/demo/scenario_1_forward35
+	$(BIN)/trajopt validate out/demo/scenario_1_forward35 --engine pybullet
+	@echo "Open out/demo/: pictures, trajectory.csv and summary.json of both runs."
+
+test: $(READY)  ## the tests (under 12 minutes on two cores)
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
+
+test-all: $(READY)  ## the tests, long ones included
+	$(BIN)/python -m pytest -n 2 --dist loadfile
+
+check: $(READY)  ## ruff, mypy and the import order
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+schema: $(READY)  ## rewrite the JSON schema of problem files
+	$(BIN)/trajopt schema --out problems/problem.schema.json
+
+pictures: $(READY)  ## rewrite the pictures that README.md shows
+	$(BIN)/python -m benchmarks.readme_pictures
+
+clean:  ## remove everything that can be made again
+	rm -rf $(VENV) out build *.egg-info
