@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from trajopt.timing.feasibility import empty_set, require_bounded, require_end_speed, require_start_speed
+from trajopt.timing.feasibility import allowed_end, empty_set, require_bounded, require_start_speed
 from trajopt.timing.stages import SD2_CAP, Stages
 
 Array = NDArray[np.float64]
@@ -25,7 +25,7 @@ def compiled_profile(stages: Stages, start: float, end: float) -> Array:
     """
     from trajopt.timing import kernel
 
-    require_end_speed(stages, end)
+    end = allowed_end(stages, end)
     sets = controllable_sets(stages, end, end)
     require_start_speed(stages, start, sets)
     require_bounded(stages, sets)

@@ -13,13 +13,17 @@ Array = NDArray[np.float64]
 _SAME = 1e-9  # relative difference of s'^2 that counts as equal
 
 
-def require_end_speed(stages: Stages, end: float) -> None:
-    """Raises InfeasibleError when a limit forbids s'^2 = ``end`` at the end of the path."""
+def allowed_end(stages: Stages, end: float) -> float:
+    """``end`` without rounding above the bound on s'^2 at the end of the path.
+
+    Raises InfeasibleError when a limit forbids it.
+    """
     allowed = stages.sd2_max[-1]
     if end > allowed * (1 + _SAME):
         limit = stages.names[int(np.argmin(stages.bounds[:, -1]))]
         raise InfeasibleError(limit, float(stages.s[-1]),
                               f"the end speed {np.sqrt(end):.6g} m/s exceeds {np.sqrt(allowed):.6g} m/s")
+    return float(min(end, allowed))
 
 
 def empty_set(stages: Stages, failed: int, sets: Array) -> InfeasibleError:

@@ -1,8 +1,7 @@
 """Gridpoints of time scaling: spline parameters u with every knot among them.
 
 The third derivative of a cubic spline jumps at knots, and with it every row that holds it (wheel
-acceleration). Each knot is therefore sampled twice, as the limit from the left and from the right; an
-interval between gridpoints uses the limits that belong to it.
+acceleration), so no interval may reach across one.
 """
 
 from __future__ import annotations
@@ -63,21 +62,3 @@ def split(u: Array, where: NDArray[np.bool_], parts: int) -> Array:
     fractions = np.arange(1, parts) / parts
     new = u[:-1][where, None] + (u[1:] - u[:-1])[where, None] * fractions
     return np.sort(np.concatenate([u, new.ravel()]))
-
-
-def with_left_limits(path: Path, u: Array) -> Array:
-    """Gridpoints (G,) with every inner knot twice: its left limit (the float before it) and itself."""
-    inner = np.asarray(path.basis.knots[1:-1])
-    return np.sort(np.concatenate([u, np.nextafter(inner, -np.inf)])) if len(inner) else u
-
-
-def fine_grid(u: Array, factor: int = 10) -> Array:
-    """(N, factor + 1): spline parameters inside every interval, ends included, ``factor`` times finer.
-
-    The right end of an interval is the limit from the left.
-    """
-    fractions = np.arange(factor + 1) / factor
-    fine = u[:-1, None] + (u[1:] - u[:-1])[:, None] * fractions
-    fine[:, 0] = u[:-1]
-    fine[:, -1] = np.nextafter(u[1:], -np.inf)
-    return np.asarray(fine)

@@ -16,7 +16,7 @@ from trajopt.timing.compiled import compiled_profile, is_compiled
 from trajopt.timing.feasibility import require_motion
 from trajopt.timing.grid import initial_grid, insert, split
 from trajopt.timing.linear import linear_profile
-from trajopt.timing.stages import Check, Stages, check, stages_on
+from trajopt.timing.stages import Check, FineRows, Stages, check, fine_rows, refined, stages_of
 from trajopt.timing.toppra import toppra_profile
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.terrain import Flat, Terrain
@@ -54,9 +54,10 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
     u = initial_grid(path, gridpoints)
     _require_drivable(path, u, robot)
     if name == "linear":
-        return _linear(path, tuple(limits), robot, terrain, u, (start_speed, end_speed))
-    u, sd2, found = _refined(path, u, limits, robot, ENGINES[name], start_speed**2, end_speed**2)
-    return _slowed(path, tuple(limits), robot, terrain, u, sd2, found, name)
+        return _linear(path, tuple(limits), robot, terrain, u)
+    fine, sd2, found = _refined(path, u, limits, robot, ENGINES[name], start_speed**2, end_speed**2)
+    factor = max(1.0, float(found.factor.max()))
+    return _slowed(path, tuple(limits), robot, terrain, fine, sd2, factor, name)
 
 
 def _require_arguments(path: Path, limits: Sequence[Limit], start: float, end: float, engine: str) -> None:
@@ -92,58 +93,51 @@ def _require_drivable(path: Path, u: Array, robot: Platform | None) -> None:
 
 
 def _refined(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | None, engine: Engine,
-             start: float, end: float) -> tuple[Array, Array, Check]:
-    """Grid, s'^2 on it, and its check, after refining where limits are broken between gridpoints."""
-    stages = stages_on(path, u, limits, robot)
-    if stages.edges:
-        u = insert(path, u, np.asarray(stages.edges))
-        stages = stages_on(path, u, limits, robot)
+             start: float, end: float) -> tuple[FineRows, Array, Check]:
+    """Rows, s'^2 and its check, after refining the grid where limits are broken between gridpoints."""
+    fine = fine_rows(path, u, limits, robot)
+    if fine.edges:
+        fine = refined(path, fine, insert(path, u, np.asarray(fine.edges)), limits, robot)
     for done in range(MOST_ROUNDS):
+        stages = stages_of(fine)
         profile = engine(stages, start, end)
-        sd2 = profile[stages.kept]
         require_motion(stages, profile)
-        found = check(path, u, sd2, np.diff(sd2) / (2 * np.diff(stages.s[stages.kept])), limits, robot)
+        sd2 = profile[stages.kept]
+        found = check(fine, sd2)
         excess = np.maximum(found.factor - 1, -found.slack.min(axis=1))
         worst = float(excess.max())
         if worst <= REFINE_ABOVE or (done >= REFINE_ROUNDS and worst <= LARGEST_SLOWDOWN - 1):
-            return u, sd2, found
+            return fine, sd2, found
         if done < MOST_ROUNDS - 1:
-            u = split(u, excess > REFINE_ABOVE, 3)
-            stages = stages_on(path, u, limits, robot)
+            fine = refined(path, fine, split(fine.u, excess > REFINE_ABOVE, 3), limits, robot)
     at = int(np.argmax(excess))
     limit = limits[int(np.argmin(found.slack[at]))].name
-    raise InfeasibleError(limit, float(stages.s[stages.kept][at]), "it is broken between gridpoints, however "
-                          "fine the grid: it jumps here, or falls to zero too fast to be followed")
+    raise InfeasibleError(limit, float(fine.s[at]), "it is broken between gridpoints, however fine the grid: "
+                          "it jumps here, or falls to zero too fast to be followed")
 
 
-def _slowed(path: Path, limits: tuple[Limit, ...], robot: Platform | None, terrain: Terrain, u: Array,
-            sd2: Array, found: Check, engine: str) -> Trajectory:
+def _slowed(path: Path, limits: tuple[Limit, ...], robot: Platform | None, terrain: Terrain, fine: FineRows,
+            sd2: Array, factor: float, engine: str) -> Trajectory:
     """The trajectory, slowed uniformly so that every limit holds on the fine grid."""
-    factor = max(1.0, float(found.factor.max()))
-    s = path.parameter(u)
     sd2 = sd2 / factor
-    result = Trajectory(path, limits, robot, terrain, u, s, np.sqrt(sd2), np.diff(sd2) / (2 * np.diff(s)),
-                        engine, float(np.sqrt(factor)))
-    for name, margin in result.margins().items():
-        if margin < -_KEPT:  # slowing does not help a limit that needs speed, or that rest breaks
-            k = [limit.name for limit in limits].index(name)
-            place = float(s[int(np.argmin(result._check.slack[:, k]))])
-            raise InfeasibleError(name, place, f"it is broken by {-margin:.2g} of its size, and slowing down "
-                                               "does not help (rest breaks it, or nearly)")
-    return result
+    slack = check(fine, sd2).slack
+    for limit, least, at in zip(limits, slack.min(axis=0), slack.argmin(axis=0), strict=True):
+        if least < -_KEPT:  # slowing does not help a limit that needs speed, or that rest breaks
+            raise InfeasibleError(limit.name, float(fine.s[at]), f"it is broken by {-least:.2g} of its size, and "
+                                  "slowing down does not help (rest breaks it, or nearly)")
+    return Trajectory(path, limits, robot, terrain, fine.u, fine.s, np.sqrt(sd2),
+                      np.diff(sd2) / (2 * np.diff(fine.s)), engine, max(1.0, float(np.sqrt(factor))))
 
 
-def _linear(path: Path, limits: tuple[Limit, ...], robot: Platform | None, terrain: Terrain, u: Array,
-            _ends: tuple[float, float]) -> Trajectory:
+def _linear(path: Path, limits: tuple[Limit, ...], robot: Platform | None, terrain: Terrain,
+            u: Array) -> Trajectory:
+    fine = fine_rows(path, u, limits, robot)
     sd2 = linear_profile(path, u)
-    s = path.parameter(u)
-    found = check(path, u, sd2, np.diff(sd2) / (2 * np.diff(s)), limits, robot)
+    found = check(fine, sd2)
     worst = float(found.factor.max())
     if not np.isfinite(worst) or worst <= 0:
         at = int(np.argmax(found.factor))
         limit = limits[int(np.argmin(found.slack[at]))].name
-        raise InfeasibleError(limit, float(s[at]), "no factor keeps the limits: nothing bounds the "
+        raise InfeasibleError(limit, float(fine.s[at]), "no factor keeps the limits: nothing bounds the "
                               "motion, or a limit is zero here")
-    sd2 = sd2 / worst
-    found = check(path, u, sd2, np.diff(sd2) / (2 * np.diff(s)), limits, robot)
-    return _slowed(path, limits, robot, terrain, u, sd2, found, "linear")
+    return _slowed(path, limits, robot, terrain, fine, sd2 / worst, 1.0, "linear")

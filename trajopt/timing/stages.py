@@ -1,7 +1,8 @@
 """Rows of all limits on a grid, and how far a profile stays inside them.
 
-A profile is s'^2 at the gridpoints; between them s'' is constant, so s'^2 is linear in s. An interval i obeys
-the rows at both of its ends with its own s'' (the interpolation scheme of TOPP-RA).
+A profile is s'^2 at the gridpoints; between them s'' is constant, so s'^2 is linear in s. An interval obeys
+the rows at both of its ends with its own s'' (the interpolation scheme of TOPP-RA); whether it obeys them in
+between is checked on a grid ten times finer. Rows depend on the path alone: each interval's are computed once.
 """
 
 from __future__ import annotations
@@ -17,23 +18,24 @@ from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples, sample_at
 from trajopt.robots.platform import Platform
-from trajopt.timing.grid import fine_grid, with_left_limits
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 SD2_CAP = 1e8  # m^2/s^2; stands for "no bound": 10 km/s, far beyond any ground robot
-_CHUNK = 2000  # intervals checked at once, to bound memory
+FINER = 10  # intervals of the fine grid in one of the solver's (DESIGN)
+_CHUNK = 1000  # intervals worked on at once, to bound memory
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stages:
-    """Rows a s'' + b s'^2 <= c at G gridpoints, divided by their scale, and bounds on s'^2.
+    """Rows a s'' + b s'^2 <= c at G places, divided by their scale, and bounds on s'^2.
 
-    A knot is there twice (left and right limit), as an interval of length zero.
+    A place between two intervals is there twice, once for each of them (limits from the left and from the
+    right differ at knots), as an interval of length zero.
     """
 
-    s: Array  # (G,) path parameter, m
+    s: Array  # (G,) path parameter, m, not decreasing
     a: Array  # (G, R)
     b: Array  # (G, R)
     c: Array  # (G, R)
@@ -45,11 +47,27 @@ class Stages:
 
     @property
     def kept(self) -> Index:
-        """Indices of the gridpoints without the second of each pair: the grid the caller knows."""
+        """Indices of the gridpoints, each once."""
         return np.flatnonzero(np.concatenate([[True], np.diff(self.s) > 0]))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class FineRows:
+    """Rows on the fine grid of N intervals, F = FINER + 1 places each, ends included."""
+
+    u: Array  # (N+1,) spline parameter at the gridpoints
+    s: Array  # (N+1,) path parameter at the gridpoints, m
+    share: Array  # (N, F) how far along its interval a place lies, 0 to 1 in s
+    a: Array  # (N, F, R)
+    b: Array  # (N, F, R)
+    c: Array  # (N, F, R)
+    bounds: Array  # (N, F, L)
+    names: tuple[str, ...]
+    row_owner: Index  # (R,)
+    edges: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Check:
     """How far a profile keeps the limits on the fine grid.
 
@@ -87,47 +105,94 @@ def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Platform | No
     return Stages(samples.s, a, b, c, np.min(bounds, axis=0), names, owner, bounds, edges)
 
 
-def stages_on(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | None) -> Stages:
-    """Rows on the grid u (N+1,), with left and right limits at knots."""
-    doubled = with_left_limits(path, u)
-    s = path.parameter(doubled)
-    inner = np.searchsorted(doubled, np.asarray(path.basis.knots[1:-1]))
-    s[inner - 1] = s[inner]
-    return assemble(sample_at(path, s, doubled), limits, robot)
+def fine_rows(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | None) -> FineRows:
+    """Rows of all limits inside every interval of the grid u (N+1,)."""
+    inside = _rows_inside(path, u[:-1], u[1:], limits, robot)
+    one = assemble(sample_at(path, np.zeros(1), u[:1]), limits, robot)
+    return FineRows(u, path.parameter(u), *inside, one.names, one.row_owner, one.edges)
 
 
-def check(path: Path, u: Array, sd2: Array, sdd: Array, limits: Sequence[Limit],
-          robot: Platform | None) -> Check:
-    """Margins of the profile sd2 (N+1,), sdd (N,) on a grid ten times finer than u (N+1,)."""
-    slack = np.empty((len(sdd), len(limits)))
-    factor = np.empty(len(sdd))
-    for first in range(0, len(sdd), _CHUNK):
-        part = slice(first, min(first + _CHUNK, len(sdd)))
-        ends = slice(part.start, part.stop + 1)
-        slack[part], factor[part] = _check_part(path, u[ends], sd2[ends], sdd[part], limits, robot)
+def _rows_inside(path: Path, left: Array, right: Array, limits: Sequence[Limit],
+                 robot: Platform | None) -> tuple[Array, Array, Array, Array, Array]:
+    """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,)."""
+    one = assemble(sample_at(path, np.zeros(1), left[:1]), limits, robot)
+    shape = (len(left), FINER + 1)
+    share = np.empty(shape)
+    a, b, c = (np.empty((*shape, len(one.row_owner))) for _ in range(3))
+    bounds = np.empty((*shape, len(limits)))
+    for first in range(0, shape[0], _CHUNK):
+        part = slice(first, min(first + _CHUNK, shape[0]))
+        fine = _fine_grid(left[part], right[part])
+        s = path.parameter(fine.ravel())
+        rows = assemble(sample_at(path, s, fine.ravel()), limits, robot)
+        s = s.reshape(fine.shape)
+        share[part] = (s - s[:, :1]) / (s[:, -1:] - s[:, :1])
+        for target, source in ((a, rows.a), (b, rows.b), (c, rows.c), (bounds, rows.bounds.T)):
+            target[part] = source.reshape(*fine.shape, -1)
+    return share, a, b, c, bounds
+
+
+def refined(path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot: Platform | None) -> FineRows:
+    """Rows on the grid u (M+1,), which contains that of ``fine``: what is known is taken over."""
+    at = np.searchsorted(u, fine.u)
+    whole = np.flatnonzero(np.diff(at) == 1)  # intervals of the old grid that stay
+    fresh = np.ones(len(u) - 1, dtype=bool)
+    fresh[at[whole]] = False
+    if not fresh.any():
+        return fine
+    new = _rows_inside(path, u[:-1][fresh], u[1:][fresh], limits, robot)
+
+    def merged(known: Array, added: Array) -> Array:
+        values = np.empty((len(u) - 1, *known.shape[1:]))
+        values[at[whole]] = known[whole]
+        values[fresh] = added
+        return values
+
+    return FineRows(u, path.parameter(u), merged(fine.share, new[0]), merged(fine.a, new[1]),
+                    merged(fine.b, new[2]), merged(fine.c, new[3]), merged(fine.bounds, new[4]),
+                    fine.names, fine.row_owner, fine.edges)
+
+
+def stages_of(fine: FineRows) -> Stages:
+    """The two ends of every interval, as the engines want them."""
+    places = 2 * len(fine.share)
+
+    def ends(values: Array) -> Array:
+        return values[:, [0, -1]].reshape(places, -1)
+
+    bounds = ends(fine.bounds)
+    s = np.repeat(fine.s, 2)[1:-1]
+    return Stages(s, ends(fine.a), ends(fine.b), ends(fine.c), np.min(bounds, axis=1), fine.names,
+                  fine.row_owner, bounds.T, fine.edges)
+
+
+def check(fine: FineRows, sd2: Array) -> Check:
+    """Margins of the profile s'^2 (N+1,) on the fine grid."""
+    count = len(fine.share)
+    sdd = np.diff(sd2) / (2 * np.diff(fine.s))
+    slack, factor = np.ones((count, len(fine.names))), np.empty(count)
+    for first in range(0, count, _CHUNK):
+        part = slice(first, min(first + _CHUNK, count))
+        share = fine.share[part]
+        x = sd2[:-1][part, None] * (1 - share) + sd2[1:][part, None] * share
+        used = fine.a[part] * sdd[part, None, None] + fine.b[part] * x[:, :, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            speed = np.max(x[:, :, None] / fine.bounds[part], axis=1)
+            needed = np.where(fine.c[part] > 0, used / fine.c[part], 1.0)
+        speed = np.where(np.isnan(speed), 0.0, speed)  # 0/0: at rest under a bound of zero
+        factor[part] = np.maximum(speed.max(axis=1), needed.max(axis=(1, 2), initial=0.0))
+        margin = (fine.c[part] - used).min(axis=1)
+        slack[part] = 1 - np.sqrt(speed)
+        for k in range(len(fine.names)):
+            mine = fine.row_owner == k
+            if mine.any():
+                slack[part, k] = np.minimum(slack[part, k], margin[:, mine].min(axis=1))
     return Check(slack, factor)
 
 
-def _check_part(path: Path, u: Array, sd2: Array, sdd: Array, limits: Sequence[Limit],
-                robot: Platform | None) -> tuple[Array, Array]:
-    fine = fine_grid(u)
-    s = path.parameter(fine.ravel())
-    rows = assemble(sample_at(path, s, fine.ravel()), limits, robot)
-    grid = s.reshape(fine.shape)
-    share = np.clip((grid - grid[:, :1]) / (grid[:, -1:] - grid[:, :1]), 0.0, 1.0)
-    x = sd2[:-1, None] * (1 - share) + sd2[1:, None] * share
-    used = rows.a * np.repeat(sdd, fine.shape[1])[:, None] + rows.b * x.reshape(-1, 1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        needed = np.where(rows.c > 0, used / rows.c, 1.0)
-        speed = x.ravel() / rows.bounds  # (L, M), 0 where nothing bounds the speed
-    speed = np.where(np.isnan(speed), 0.0, speed)  # 0/0: at rest under a bound of zero
-    fastest = np.max(speed, axis=0, initial=0.0)
-    factor = np.maximum(fastest, needed.max(axis=1, initial=0.0)).reshape(fine.shape).max(axis=1)
-    slack = np.ones((len(sdd), len(limits)))
-    margin = (rows.c - used).reshape(*fine.shape, -1).min(axis=1)
-    for k in range(len(limits)):
-        mine = rows.row_owner == k
-        if mine.any():
-            slack[:, k] = margin[:, mine].min(axis=1)
-        slack[:, k] = np.minimum(slack[:, k], 1 - np.sqrt(speed[k].reshape(fine.shape).max(axis=1)))
-    return slack, factor
+def _fine_grid(left: Array, right: Array) -> Array:
+    """(N, F): spline parameters inside every interval. Its right end is the limit from the left."""
+    fine = left[:, None] + (right - left)[:, None] * (np.arange(FINER + 1) / FINER)
+    fine[:, 0] = left
+    fine[:, -1] = np.nextafter(right, -np.inf)
+    return np.asarray(fine)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.errors import InfeasibleError
-from trajopt.timing.feasibility import empty_set, require_bounded, require_end_speed, require_start_speed
+from trajopt.timing.feasibility import allowed_end, empty_set, require_bounded, require_start_speed
 from trajopt.timing.stages import SD2_CAP, Stages
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ def toppra_profile(stages: Stages, start: float, end: float) -> Array:
     apart, so toppra's own discretisation switch (which custom constraints ignore silently) is not needed.
     Raises InfeasibleError naming limit and place.
     """
-    require_end_speed(stages, end)
+    end = allowed_end(stages, end)
     kept = stages.kept
     group = np.cumsum(np.concatenate([[False], np.diff(stages.s) > 0]))
     grid = stages.s[kept]

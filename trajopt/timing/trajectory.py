@@ -16,7 +16,7 @@ from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
 from trajopt.robots.platform import Platform
-from trajopt.timing.stages import Check, check
+from trajopt.timing.stages import Check, check, fine_rows
 from trajopt.timing.wheels import WheelTable, wheel_table
 from trajopt.world.terrain import Terrain
 
@@ -123,7 +123,7 @@ class Trajectory:
 
     @cached_property
     def _check(self) -> Check:
-        return check(self.path, self.u, self.sd**2, self.sdd, self.limits, self.robot)
+        return check(fine_rows(self.path, self.u, self.limits, self.robot), self.sd**2)
 
     @cached_property
     def _wheels(self) -> WheelTable | None:
