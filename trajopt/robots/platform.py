@@ -65,8 +65,11 @@ class Platform:
 
     @cached_property
     def inverse(self) -> Array:
-        """(W, 3): wheel rates (rad/s) = inverse @ (vx, vy, wz), from the rolling rows (003)."""
-        rows = [w.rolling() for w in self.wheels]
+        """(W, 3): wheel rates (rad/s) = inverse @ (vx, vy, wz), from the rolling rows (003).
+
+        Steered wheels and castors stand at their own ``beta``; mobility.inverse_at takes other angles.
+        """
+        rows = [w.driving() for w in self.wheels]
         matrix = np.array([[r.x / r.spin, r.y / r.spin, r.yaw / r.spin] for r in rows], dtype=np.float64)
         matrix[np.abs(matrix) < 1e-12 * np.abs(matrix).max()] = 0.0
         return matrix
@@ -84,7 +87,8 @@ class Platform:
     def admissible(self) -> Array:
         """(3, m): orthonormal basis of the body twists that no sliding row forbids (m = mobility)."""
         rows = [w.sliding() for w in self.wheels]
-        constraints = np.array([[r.x, r.y, r.yaw] for r in rows if not r.free], dtype=np.float64)
+        constraints = np.array([[r.x, r.y, r.yaw] for r in rows if not r.free and r.steer == 0],
+                               dtype=np.float64)  # a castor gives way by steering
         if constraints.size == 0:
             return np.eye(3)
         _, singular, vt = np.linalg.svd(constraints)

@@ -4,7 +4,8 @@ A wheel is described by the lecture's polar data: its centre (for a castor, its 
 ``l`` and angle ``alpha`` in the body frame; ``beta`` turns the wheel plane so that the rolling direction
 is t = (sin(alpha + beta), -cos(alpha + beta)) and the axle n = (cos(alpha + beta), sin(alpha + beta));
 ``gamma`` is the angle between the roller's rolling direction and the wheel plane (Swedish wheels);
-``radius`` is the wheel radius and ``offset`` the length of a castor arm.
+``radius`` is the wheel radius. A castor's wheel sits at ``offset`` along t from its pivot (negative: it
+trails) and at ``lateral`` along n, 0 for a single wheel and +-half the split for a split castor.
 
 The rows act on the body twist (vx, vy, wz), in the body frame, and on the joint rates:
 
@@ -63,6 +64,7 @@ class Wheel:
     radius: float
     gamma: float = 0.0
     offset: float = 0.0
+    lateral: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.radius > 0:
@@ -73,6 +75,8 @@ class Wheel:
             raise ArgumentError("gamma", self.gamma, "a roller angle with cos(gamma) != 0")
         if self.kind is WheelKind.CASTOR and not abs(self.offset) > 0:
             raise ArgumentError("offset", self.offset, "a castor arm different from 0 m")
+        if self.kind is not WheelKind.CASTOR and self.lateral != 0:
+            raise ArgumentError("lateral", self.lateral, "0 m: only a castor's wheel stands beside its pivot")
 
     @property
     def position(self) -> tuple[float, float]:
@@ -80,11 +84,15 @@ class Wheel:
         return self.l * float(np.cos(self.alpha)), self.l * float(np.sin(self.alpha))
 
     def rolling(self, beta: Any = None) -> Row:
-        """Pure rolling along the wheel plane (003, eqs. for each kind). ``beta``: steering angle, rad."""
+        """Pure rolling along the wheel plane (003, eqs. for each kind). ``beta``: steering angle, rad.
+
+        A wheel beside its castor's pivot also rolls when the arm turns: its speed is less by lateral (wz + beta').
+        """
         b = self.beta if beta is None else beta
         turn = b + (self.gamma if self.kind is WheelKind.SWEDISH else 0.0)
         spin = self.radius * np.cos(self.gamma) if self.kind is WheelKind.SWEDISH else self.radius
-        return Row(np.sin(self.alpha + turn), -np.cos(self.alpha + turn), -self.l * np.cos(turn), spin)
+        return Row(np.sin(self.alpha + turn), -np.cos(self.alpha + turn),
+                   -self.l * np.cos(turn) - self.lateral, spin, self.lateral)
 
     def sliding(self, beta: Any = None) -> Row:
         """No sideways slip (003). For Swedish and spherical wheels the row is free.
@@ -105,6 +113,16 @@ class Wheel:
             -arm,
             free=self.kind in (WheelKind.SWEDISH, WheelKind.SPHERICAL),
         )
+
+    def driving(self, beta: Any = None) -> Row:
+        """The rolling row once a castor's steering rate is taken from its sliding row: (x, y, yaw) . twist
+        = spin phi'. The rolling row itself for wheels that roll in the plane of their pivot."""
+        roll = self.rolling(beta)
+        if self.lateral == 0:
+            return roll
+        slide = self.sliding(beta)
+        share = roll.steer / slide.steer
+        return Row(roll.x - share * slide.x, roll.y - share * slide.y, roll.yaw - share * slide.yaw, roll.spin)
 
 
 def swedish_wheel(x: float, y: float, radius: float, gamma: float) -> Wheel:
