@@ -131,7 +131,7 @@ SUMMARY_HEADER = (
 
 def summary(rows: Sequence[Row]) -> list[tuple[str, ...]]:
     """Worst values over motions and speeds for each engine, wheel and shape."""
-    lines = []
+    lines: list[tuple[str, ...]] = []
     for key in dict.fromkeys((r.case.engine, r.case.wheel, r.case.shape) for r in rows):
         group = [r for r in rows if (r.case.engine, r.case.wheel, r.case.shape) == key]
         along = max((r.along for r in group), key=abs)

@@ -66,9 +66,7 @@ class SimRobot:
 
     def wheel_centres(self) -> FloatArray:
         """Wheel centres (4, 3) in the robot frame [m]."""
-        return np.array(
-            [(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)]
-        )
+        return np.array([(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)])
 
     def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> FloatArray:
         """Wheel speeds (4,) [rad/s] that roll without slip at body speeds (m/s, m/s, rad/s).

@@ -6,9 +6,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from trajopt.simulate.engine import GRAVITY, Camera, SimRobot
-from trajopt.simulate.rollers import Ellipsoid, Revolved, Roller, RollerWheel, SphereChain, revolve
+from trajopt.simulate.rollers import (
+    Ellipsoid,
+    Revolved,
+    Roller,
+    RollerWheel,
+    SphereChain,
+    disc_inertia,
+    hub_drum,
+    is_cylinder,
+    revolve,
+    roller_size,
+)
 from trajopt.simulate.scene import Block, Scene, blocks
-from trajopt.simulate.urdf import disc_inertia, roller_size
 
 # Collision bits: parts of the robot meet the terrain and never each other.
 ROBOT_BITS = 'contype="1" conaffinity="2"'
@@ -30,6 +40,8 @@ class Solver:
 
 def scene_mjcf(robot: SimRobot, scene: Scene, solver: Solver, camera: Camera | None) -> str:
     """MJCF of robot and terrain: a free base, wheel joints ``wheel_0`` to ``wheel_3``, actuators likewise."""
+    names = _mesh_names(robot)
+    meshes = "".join(_mesh(profile, name) for profile, name in names.items())
     size = (camera.width, camera.height) if camera is not None else (64, 64)
     ground = f'<geom name="ground" type="plane" size="0 0 1" material="floor" {TERRAIN_BITS}/>'
     solids = "".join(_block(block) for block in blocks(scene.terrain))
@@ -42,9 +54,9 @@ def scene_mjcf(robot: SimRobot, scene: Scene, solver: Solver, camera: Camera | N
         f'solref="{solver.contact_time!r} {solver.contact_damping!r}"/></default>'
         f'<asset><texture name="checks" type="2d" builtin="checker" rgb1="0.95 0.95 0.95" '
         f'rgb2="0.62 0.7 0.92" width="256" height="256"/>'
-        f'<material name="floor" texture="checks" texrepeat="1 1" texuniform="true"/>{_meshes(robot)}</asset>'
+        f'<material name="floor" texture="checks" texrepeat="1 1" texuniform="true"/>{meshes}</asset>'
         f'<worldbody><light pos="0 0 4" dir="0.2 0.3 -1" directional="true"/>{ground}{solids}'
-        f"{_robot(robot)}</worldbody>"
+        f"{_robot(robot, names)}</worldbody>"
         f"<actuator>{_motors(robot, solver)}</actuator></mujoco>"
     )
 
@@ -56,10 +68,10 @@ def _block(block: Block) -> str:
     return f'<geom type="box" size="{half}" {place} rgba="0.75 0.62 0.42 1" {TERRAIN_BITS}/>'
 
 
-def _robot(robot: SimRobot) -> str:
+def _robot(robot: SimRobot, names: dict[Revolved, str]) -> str:
     middle = robot.chassis_clearance + robot.chassis_size[2] / 2.0
     half = _numbers(extent / 2.0 for extent in robot.chassis_size)
-    wheels = "".join(_wheel(robot, index) for index in range(4))
+    wheels = "".join(_wheel(robot, index, names) for index in range(4))
     return (
         f'<body name="robot"><freejoint name="base"/><inertial pos="0 0 {robot.cog_height!r}" '
         f'mass="{robot.chassis_mass!r}" diaginertia="{_numbers(robot.inertia)}"/>'
@@ -68,12 +80,13 @@ def _robot(robot: SimRobot) -> str:
     )
 
 
-def _wheel(robot: SimRobot, index: int) -> str:
+def _wheel(robot: SimRobot, index: int, names: dict[Revolved, str]) -> str:
     wheel = robot.wheels[index]
     x, y = robot.wheel_positions[index]
     about, across = disc_inertia(wheel.hub_mass, 0.8 * wheel.radius, wheel.width)
-    disc = f'type="cylinder" size="{0.75 * wheel.radius!r} {0.15 * wheel.width!r}" euler="1.5707963 0 0"'
-    rollers = "".join(_roller(index, number, wheel, roller) for number, roller in enumerate(wheel.rollers))
+    drum = hub_drum(wheel)
+    disc = f'type="cylinder" size="{drum.radii[0]!r} {drum.stations[1]!r}" euler="1.5707963 0 0"'
+    rollers = "".join(_roller(number, wheel, roller, names) for number, roller in enumerate(wheel.rollers))
     return (
         f'<body name="hub_{index}" pos="{_numbers((x, y, wheel.radius))}">'
         f'<joint name="wheel_{index}" type="hinge" axis="0 1 0"/>'
@@ -82,10 +95,10 @@ def _wheel(robot: SimRobot, index: int) -> str:
     )
 
 
-def _roller(index: int, number: int, wheel: RollerWheel, roller: Roller) -> str:
+def _roller(number: int, wheel: RollerWheel, roller: Roller, names: dict[Revolved, str]) -> str:
     about, across = disc_inertia(wheel.roller_mass, *roller_size(roller))
     colour = f'rgba="{ROLLER_COLOURS[number % 2]}"'
-    shapes = "".join(f"<geom {shape} {colour} {ROBOT_BITS}/>" for shape in _shapes(index, number, roller))
+    shapes = "".join(f"<geom {shape} {colour} {ROBOT_BITS}/>" for shape in _shapes(roller, names))
     return (
         f'<body pos="{_numbers(roller.centre)}" zaxis="{_numbers(roller.axis)}">'
         f'<joint type="hinge" axis="0 0 1"/>'
@@ -95,34 +108,30 @@ def _roller(index: int, number: int, wheel: RollerWheel, roller: Roller) -> str:
     )
 
 
-def _shapes(index: int, number: int, roller: Roller) -> list[str]:
+def _shapes(roller: Roller, names: dict[Revolved, str]) -> list[str]:
     profile = roller.profile
     if isinstance(profile, SphereChain):
         pairs = zip(profile.stations, profile.radii, strict=True)
         return [f'type="sphere" size="{radius!r}" pos="0 0 {station!r}"' for station, radius in pairs]
     if isinstance(profile, Ellipsoid):
         return [f'type="ellipsoid" size="{_numbers((profile.radius, profile.radius, profile.half_length))}"']
-    if _is_cylinder(profile):
+    if is_cylinder(profile):
         low, high = profile.stations
         size = _numbers((profile.radii[0], (high - low) / 2.0))
         return [f'type="cylinder" size="{size}" pos="0 0 {(low + high) / 2.0!r}"']
-    return [f'type="mesh" mesh="roller_{index}_{number}"']
+    return [f'type="mesh" mesh="{names[profile]}"']
 
 
-def _meshes(robot: SimRobot) -> str:
-    """One convex mesh a roller that needs one. MuJoCo moves a mesh to its own principal frame and back."""
-    texts = []
-    for index, wheel in enumerate(robot.wheels):
-        for number, roller in enumerate(wheel.rollers):
-            profile = roller.profile
-            if isinstance(profile, Revolved) and not _is_cylinder(profile):
-                vertices = _numbers(revolve(profile).ravel().tolist())
-                texts.append(f'<mesh name="roller_{index}_{number}" vertex="{vertices}"/>')
-    return "".join(texts)
+def _mesh_names(robot: SimRobot) -> dict[Revolved, str]:
+    """A mesh name for every different profile that needs one."""
+    profiles = [roller.profile for wheel in robot.wheels for roller in wheel.rollers]
+    needed = [p for p in profiles if isinstance(p, Revolved) and not is_cylinder(p)]
+    return {profile: f"roller_{index}" for index, profile in enumerate(dict.fromkeys(needed))}
 
 
-def _is_cylinder(profile: Revolved) -> bool:
-    return len(profile.radii) == 2 and profile.radii[0] == profile.radii[1]
+def _mesh(profile: Revolved, name: str) -> str:
+    """Convex mesh. MuJoCo moves it to its own principal frame and back."""
+    return f'<mesh name="{name}" vertex="{_numbers(revolve(profile).ravel().tolist())}"/>'
 
 
 def _motors(robot: SimRobot, solver: Solver) -> str:

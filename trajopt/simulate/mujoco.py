@@ -40,9 +40,7 @@ class MuJoCo:
         """Raise ArgumentError for options that MuJoCo cannot use."""
         Pace(self.step, self.stride)
         if not self.contact_time >= 2.0 * self.step:
-            raise ArgumentError(
-                "contact_time", self.contact_time, f"at least two steps = {2 * self.step:g} s"
-            )
+            raise ArgumentError("contact_time", self.contact_time, f"at least two steps = {2 * self.step:g} s")
         for name in ("contact_damping", "wheel_gain", "iterations"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ArgumentError(name, getattr(self, name), "a positive number")

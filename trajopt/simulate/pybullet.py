@@ -60,9 +60,7 @@ class PyBullet:
         if self.solver_iterations < 1:
             raise ArgumentError("solver_iterations", self.solver_iterations, "at least 1 iteration")
         if not self.contact_breaking_threshold > 0.0:
-            raise ArgumentError(
-                "contact_breaking_threshold", self.contact_breaking_threshold, "a length in m"
-            )
+            raise ArgumentError("contact_breaking_threshold", self.contact_breaking_threshold, "a length in m")
         for name in ("contact_erp", "wheel_gain"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise ArgumentError(name, getattr(self, name), "a share in (0, 1]")
@@ -235,9 +233,7 @@ def _session(
     for joint, angle in zip(wheels, folded, strict=True):
         bullet.resetJointState(body, joint, float(angle), 0.0, physicsClientId=client)
     cog = np.array([0.0, 0.0, robot.cog_height])
-    return _BulletSession(
-        bullet, client, body, wheels, robot.torque_limit, options.wheel_gain, cog, start - folded
-    )
+    return _BulletSession(bullet, client, body, wheels, robot.torque_limit, options.wheel_gain, cog, start - folded)
 
 
 def _terrain(bullet: Any, client: int, scene: Scene, *, visible: bool) -> Iterator[int]:
@@ -248,24 +244,18 @@ def _terrain(bullet: Any, client: int, scene: Scene, *, visible: bool) -> Iterat
         shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
         colour = [0.75, 0.62, 0.42, 1.0]
         seen = (
-            bullet.createVisualShape(
-                bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client
-            )
+            bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client)
             if visible
             else -1
         )
-        yield bullet.createMultiBody(
-            0.0, shape, seen, block.centre, block.quaternion(), physicsClientId=client
-        )
+        yield bullet.createMultiBody(0.0, shape, seen, block.centre, block.quaternion(), physicsClientId=client)
 
 
 def _load(bullet: Any, client: int, robot: SimRobot, command: Command, *, visible: bool) -> int:
     x, y, yaw = command.start_pose
     with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
         path = Path(folder) / "robot.urdf"
-        path.write_text(
-            robot_urdf(robot, Path(folder), margin=HULL_MARGIN, visible=visible), encoding="utf-8"
-        )
+        path.write_text(robot_urdf(robot, Path(folder), margin=HULL_MARGIN, visible=visible), encoding="utf-8")
         try:
             return int(
                 bullet.loadURDF(
@@ -286,9 +276,7 @@ def _surface(bullet: Any, client: int, body: int, link: int, *, friction: float)
     Joint speed or damping in the same call as friction makes Bullet drop the friction.
     """
     bullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
-    bullet.changeDynamics(
-        body, link, jointDamping=0.0, maxJointVelocity=MAX_JOINT_SPEED, physicsClientId=client
-    )
+    bullet.changeDynamics(body, link, jointDamping=0.0, maxJointVelocity=MAX_JOINT_SPEED, physicsClientId=client)
     bullet.changeDynamics(
         body,
         link,

@@ -107,20 +107,20 @@ def smdw_wheel(
     def support(phi: FloatArray) -> FloatArray:
         return hub_support(made, phi)
 
-    arc = _circle_seats(circle_rollers, circle_roller_radius, angle)
-    oval = _ellipse_seats(made, ellipse_rollers, ellipse_roller_radius, angle)
-    hub = tuple(place_roller(seat, support, shape=shape, spheres=spheres) for seat in (*oval, *arc))
+    pitch = math.pi / circle_rollers
+    first = math.pi / 2.0 + pitch / 2.0
+    around = Seat(first, (first - pitch / 2.0, first + pitch / 2.0), circle_roller_radius, angle)
+    model = place_roller(around, support, shape=shape, spheres=spheres)
+    seats = _ellipse_seats(made, ellipse_rollers, ellipse_roller_radius, angle)
+    hub = (
+        *(place_roller(seat, support, shape=shape, spheres=spheres) for seat in seats),
+        *(turned(model, index * pitch) for index in range(circle_rollers)),
+    )
     side = made.offset if outer_left else -made.offset
     outer = tuple(shifted(roller, side) for roller in hub)
     inner = tuple(shifted(turned(roller, math.pi), -side) for roller in hub)
     width = 2.0 * reach_along_axle(outer + inner)
     return RollerWheel(made.radius, width, angle, outer + inner, hub_mass, roller_mass)
-
-
-def _circle_seats(count: int, radius: float, angle: float) -> list[Seat]:
-    pitch = math.pi / count
-    starts = [math.pi / 2.0 + index * pitch for index in range(count)]
-    return [Seat(start + pitch / 2.0, (start, start + pitch), radius, angle) for start in starts]
 
 
 def _ellipse_seats(sizes: HubSizes, count: int, radius: float, angle: float) -> list[Seat]:
@@ -158,9 +158,7 @@ def loc8_smdw(
     Lengths [m], masses [kg], torque [N m]. Raises ArgumentError naming the size that makes no robot.
     """
     wheels = tuple(
-        smdw_wheel(
-            sizes, angle=sign * ROLLER_ANGLE, outer_left=left, shape=shape, spheres=spheres, mass=wheel_mass
-        )
+        smdw_wheel(sizes, angle=sign * ROLLER_ANGLE, outer_left=left, shape=shape, spheres=spheres, mass=wheel_mass)
         for sign, left in ((-1.0, True), (1.0, False), (1.0, True), (-1.0, False))
     )
     return loc8_on(

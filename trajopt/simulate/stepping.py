@@ -7,12 +7,14 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.simulate.engine import (
     Camera,
     Command,
     Controller,
+    FloatArray,
     Observation,
     Recording,
     Session,
@@ -84,6 +86,19 @@ def drive(
             reason = explosion(rows[-1])
     wall = time.perf_counter() - begun
     image = session.render(picture) if picture is not None else None
+    return _assembled(robot, label, np.array(times), rows, reason, (wall, settle), image)
+
+
+def _assembled(
+    robot: SimRobot,
+    label: tuple[str, str],
+    times: FloatArray,
+    rows: list[Observation],
+    reason: str,
+    clock: tuple[float, float],
+    image: NDArray[np.uint8] | None,
+) -> Recording:
+    """Recording from observations; ``clock`` is the wall time and the settling time [s]."""
     rotation = np.array([row.rotation for row in rows])
     position = np.array([row.position for row in rows])
     yaw = np.unwrap(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
@@ -91,7 +106,7 @@ def drive(
     return Recording(
         engine=label[0],
         version=label[1],
-        times=np.array(times),
+        times=times,
         pose=np.column_stack([position[:, 0], position[:, 1], yaw]),
         height=position[:, 2],
         roll=np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]),
@@ -103,8 +118,8 @@ def drive(
         contacts=np.array([row.contacts for row in rows], dtype=np.int64),
         exploded=bool(reason),
         reason=reason,
-        wall_time=wall,
-        real_time_factor=(settle + times[-1]) / wall,
+        wall_time=clock[0],
+        real_time_factor=(clock[1] + float(times[-1])) / clock[0],
         picture=image,
     )
 

@@ -28,9 +28,7 @@ class Deviation:
     yaw: float
 
 
-def straight_command(
-    robot: SimRobot, direction: float, distance: float, speed: float, *, ramp: float = 0.5
-) -> Command:
+def straight_command(robot: SimRobot, direction: float, distance: float, speed: float, *, ramp: float = 0.5) -> Command:
     """Wheel speeds that carry ``robot`` straight by ``distance`` [m] at ``speed`` [m/s].
 
     ``direction`` [rad] in the body, ``ramp`` [s] to full speed and to rest again (chosen: 1.7 m/s^2 at

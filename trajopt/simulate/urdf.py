@@ -3,17 +3,37 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from trajopt.errors import ArgumentError
 from trajopt.simulate.engine import FloatArray, SimRobot
-from trajopt.simulate.rollers import Ellipsoid, Revolved, Roller, RollerWheel, SphereChain, revolve
+from trajopt.simulate.rollers import (
+    Revolved,
+    Roller,
+    RollerWheel,
+    SphereChain,
+    disc_inertia,
+    hub_drum,
+    is_cylinder,
+    revolve,
+    roller_size,
+)
 
 CHASSIS_COLOUR = "0.25 0.35 0.55 1"
 ROLLER_COLOURS = ("0.15 0.15 0.15 1", "0.85 0.45 0.1 1")  # every other roller: turning shows in pictures
 HUB_COLOUR = "0.7 0.7 0.72 1"
+
+
+@dataclass(frozen=True)
+class _Style:
+    """How parts are written: mesh files by profile, the margin [m] of the engine, with visuals or not."""
+
+    meshes: dict[Revolved, str]
+    margin: float
+    visible: bool
 
 
 def robot_urdf(robot: SimRobot, folder: Path, *, margin: float, visible: bool) -> str:
@@ -23,34 +43,25 @@ def robot_urdf(robot: SimRobot, folder: Path, *, margin: float, visible: bool) -
     ``roller_<wheel>_<roller>``. ``visible`` adds visual shapes. Raises ArgumentError for an ellipsoid
     roller, which URDF does not know.
     """
+    profiles = [roller.profile for wheel in robot.wheels for roller in wheel.rollers]
+    solids = [p for p in dict.fromkeys(profiles) if isinstance(p, Revolved) and not is_cylinder(p)]
+    style = _Style({profile: f"mesh_{index}.obj" for index, profile in enumerate(solids)}, margin, visible)
+    for profile, file in style.meshes.items():
+        (folder / file).write_text(_obj(revolve(profile, shrink=margin), profile), encoding="utf-8")
     parts = [f'<?xml version="1.0"?>\n<robot name="robot">\n{_chassis(robot, visible)}']
     for index, wheel in enumerate(robot.wheels):
         x, y = robot.wheel_positions[index]
         place = (x, y, wheel.radius - robot.cog_height)
         parts.append(_joint(f"wheel_{index}", "chassis", f"hub_{index}", place, "0 0 0", "0 1 0"))
         parts.append(_hub(f"hub_{index}", wheel, visible))
+        drum = hub_drum(wheel)
+        (folder / f"hub_{index}.obj").write_text(_obj(revolve(drum), drum), encoding="utf-8")
         for number, roller in enumerate(wheel.rollers):
             name = f"roller_{index}_{number}"
-            parts.append(
-                _joint(name, f"hub_{index}", f"{name}_link", roller.centre, _attitude(roller), "0 0 1")
-            )
-            parts.append(_roller(f"{name}_link", wheel, roller, folder, margin, visible, number))
+            parts.append(_joint(name, f"hub_{index}", f"{name}_link", roller.centre, _attitude(roller), "0 0 1"))
+            parts.append(_roller(f"{name}_link", number, wheel, roller, style))
     parts.append("</robot>\n")
     return "".join(parts)
-
-
-def disc_inertia(mass: float, radius: float, length: float) -> tuple[float, float]:
-    """Moments of a solid cylinder (about its axis, across it) [kg m^2]."""
-    return mass * radius**2 / 2.0, mass * (3.0 * radius**2 + length**2) / 12.0
-
-
-def roller_size(roller: Roller) -> tuple[float, float]:
-    """Radius and length [m] of the cylinder whose inertia the roller gets."""
-    profile = roller.profile
-    if isinstance(profile, Ellipsoid):
-        # an ellipsoid stands for a barrel that is cut off at half its length
-        return profile.radius, profile.half_length
-    return max(profile.radii), max(profile.stations) - min(profile.stations) + max(profile.radii)
 
 
 def _chassis(robot: SimRobot, visible: bool) -> str:
@@ -71,8 +82,8 @@ def _hub(name: str, wheel: RollerWheel, visible: bool) -> str:
     seen = ""
     if visible:
         upright = f'<origin rpy="{math.pi / 2.0!r} 0 0"/>'
-        disc = f'<cylinder radius="{0.75 * wheel.radius!r}" length="{0.3 * wheel.width!r}"/>'
-        seen = f"<visual>{upright}<geometry>{disc}</geometry>{_material('hub', HUB_COLOUR)}</visual>"
+        disc = f'<geometry><mesh filename="{name}.obj"/></geometry>'
+        seen = f"<visual>{upright}{disc}{_material('hub', HUB_COLOUR)}</visual>"
     return (
         f'<link name="{name}"><inertial><mass value="{wheel.hub_mass!r}"/>'
         f'<inertia ixx="{across!r}" iyy="{about!r}" izz="{across!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -80,14 +91,12 @@ def _hub(name: str, wheel: RollerWheel, visible: bool) -> str:
     )
 
 
-def _roller(
-    name: str, wheel: RollerWheel, roller: Roller, folder: Path, margin: float, visible: bool, number: int
-) -> str:
+def _roller(name: str, number: int, wheel: RollerWheel, roller: Roller, style: _Style) -> str:
     about, across = disc_inertia(wheel.roller_mass, *roller_size(roller))
-    shapes = _shapes(name, roller, folder, margin)
+    shapes = _shapes(roller, style)
     colour = _material(f"roller{number % 2}", ROLLER_COLOURS[number % 2])
     solid = "".join(f"<collision>{shape}</collision>" for shape in shapes)
-    seen = "".join(f"<visual>{shape}{colour}</visual>" for shape in shapes) if visible else ""
+    seen = "".join(f"<visual>{shape}{colour}</visual>" for shape in shapes) if style.visible else ""
     return (
         f'<link name="{name}"><inertial><mass value="{wheel.roller_mass!r}"/>'
         f'<inertia ixx="{across!r}" iyy="{across!r}" izz="{about!r}" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -95,7 +104,7 @@ def _roller(
     )
 
 
-def _shapes(name: str, roller: Roller, folder: Path, margin: float) -> list[str]:
+def _shapes(roller: Roller, style: _Style) -> list[str]:
     profile = roller.profile
     if isinstance(profile, SphereChain):
         return [
@@ -103,12 +112,11 @@ def _shapes(name: str, roller: Roller, folder: Path, margin: float) -> list[str]
             for station, radius in zip(profile.stations, profile.radii, strict=True)
         ]
     if isinstance(profile, Revolved):
-        if len(profile.radii) == 2 and profile.radii[0] == profile.radii[1]:
+        if is_cylinder(profile):
             low, high = profile.stations
             size = f'<cylinder radius="{profile.radii[0]!r}" length="{high - low!r}"/>'
             return [f'<origin xyz="0 0 {(low + high) / 2.0!r}"/><geometry>{size}</geometry>']
-        (folder / f"{name}.obj").write_text(_obj(revolve(profile, shrink=margin), profile), encoding="utf-8")
-        return [f'<geometry><mesh filename="{name}.obj"/></geometry>']
+        return [f'<geometry><mesh filename="{style.meshes[profile]}"/></geometry>']
     raise ArgumentError("shape", "ellipsoid", "spheres, barrel, cylinder or cone (URDF has no ellipsoid)")
 
 
