@@ -1,0 +1,93 @@
+"""Writing files so that a reader never meets half of one."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from pathlib import Path as FilePath
+from typing import Any
+
+from trajopt.errors import ArgumentError
+
+
+def write_text(file: FilePath, text: str) -> None:
+    """Write under a temporary name in the same folder, then rename."""
+    part = file.with_name(f".{file.name}.part")
+    part.write_text(text, encoding="utf-8", newline="\n")
+    os.replace(part, file)
+
+
+def write_json(file: FilePath, content: dict[str, Any]) -> None:
+    """Write JSON, indented; numbers that are not finite become null."""
+    write_text(file, json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def read_json(file: FilePath) -> dict[str, Any]:
+    """The object in a JSON file. Raises ArgumentError for a file that is missing or holds something else."""
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ArgumentError("folder", str(file.parent), f"a folder with {file.name}, written by solve --out"
+                            ) from None
+    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+        raise ArgumentError(str(file), str(error), "valid JSON, as solve --out writes it") from None
+    if not isinstance(content, dict):
+        raise ArgumentError(str(file), type(content).__name__, "a JSON object, as solve --out writes it")
+    return content
+
+
+def finite(value: Any) -> Any:
+    """The same content in JSON's types, with None for numbers that are not finite."""
+    if isinstance(value, dict):
+        return {str(key): finite(part) for key, part in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(part) for part in value]
+    if hasattr(value, "tolist"):  # NumPy arrays and scalars
+        return finite(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def made_folder(folder: str | FilePath) -> FilePath:
+    """The folder, made if needed. Raises ArgumentError where a file is in the way."""
+    place = FilePath(folder)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise ArgumentError("folder", str(folder), "a folder, or a name that is not taken by a file") from None
+    except PermissionError:
+        raise ArgumentError("folder", str(folder), "a folder that you may write to") from None
+    return place
+
+
+def as_toml(table: dict[str, Any]) -> str:
+    """TOML text of nested tables with strings, booleans, numbers and arrays (inline where they hold tables)."""
+    return "\n".join(_lines(table, ())).strip() + "\n"
+
+
+def _lines(table: dict[str, Any], place: tuple[str, ...]) -> list[str]:
+    values = [f"{_key(k)} = {_value(v)}" for k, v in table.items() if not isinstance(v, dict)]
+    head = ["", f"[{'.'.join(_key(part) for part in place)}]"] if place and (values or not table) else []
+    nested = [line for k, v in table.items() if isinstance(v, dict) for line in _lines(v, (*place, k))]
+    return [*head, *values, *nested]
+
+
+def _key(name: str) -> str:
+    bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
+    return name if bare else _value(name)
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, str):  # JSON's escapes are TOML's, but for DEL
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_value(part) for part in value) + "]"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+    raise ArgumentError("value", value, "a string, boolean, number, array or table")

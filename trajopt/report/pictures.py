@@ -1,0 +1,51 @@
+"""The pictures of one run, each by its own module."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path as FilePath
+from typing import TYPE_CHECKING
+
+from trajopt.pipeline import Solution
+from trajopt.report.convergence_picture import convergence_figure
+from trajopt.report.files import made_folder
+from trajopt.report.path_picture import path_figure
+from trajopt.report.physics_picture import physics_figure
+from trajopt.report.profile_picture import profile_figure
+from trajopt.report.style import in_style, save_figure
+
+if TYPE_CHECKING:
+    from trajopt.simulate.check import ValidationReport
+
+
+def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath, ...]:
+    """Draw path.png, convergence.png and, for a solution with a trajectory, profile.png. Returns the files.
+
+    Raises ArgumentError where the folder cannot be written.
+    """
+    place = made_folder(folder)
+    with in_style():
+        files = [save_figure(path_figure(solution), place / "path.png"),
+                 save_figure(convergence_figure(solution), place / "convergence.png")]
+        if solution.trajectory is not None:
+            files.append(save_figure(profile_figure(solution, solution.trajectory), place / "profile.png"))
+    return tuple(files)
+
+
+def save_physics_picture(solution: Solution, report: ValidationReport,
+                         folder: str | FilePath) -> tuple[FilePath, ...]:
+    """Draw physics.png and, where the engine made a picture, engine.png. Returns the files.
+
+    Raises ArgumentError for a solution without a trajectory or a folder that cannot be written.
+    """
+    place = made_folder(folder)
+    with in_style():
+        files = [save_figure(physics_figure(solution, report), place / "physics.png")]
+    if report.recording.picture is not None:
+        from matplotlib.image import imsave
+
+        part = place / ".engine.png.part"
+        imsave(part, report.recording.picture, format="png")
+        os.replace(part, place / "engine.png")
+        files.append(place / "engine.png")
+    return tuple(files)

@@ -1,0 +1,102 @@
+"""One look for all pictures: colours that colour-blind readers can tell apart, thin axes, SI units.
+
+The colours are those of Okabe and Ito, "Color Universal Design" (2008).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path as FilePath
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+BLACK, GREY, LIGHT = "#000000", "#6b6b6b", "#c9c9c9"
+ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
+BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+
+# Wheels in the order of every per-wheel array: colour tells left from right, the dash front from rear.
+WHEEL_COLOURS = (BLUE, VERMILION, BLUE, VERMILION)
+WHEEL_DASHES = ("-", "-", (0, (4, 1.5)), (0, (4, 1.5)))
+
+LIMIT_COLOURS: Mapping[str, str] = MappingProxyType({
+    "speed": BLUE,
+    "acceleration": ORANGE,
+    "wheel_speed": GREEN,
+    "wheel_acceleration": PURPLE,
+    "slip": VERMILION,
+    "tip": BLACK,
+    "yaw_rate": SKY,
+    "speed_profile": YELLOW,
+    "speed_zones": YELLOW,
+})
+_SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed
+
+RESOLUTION = 160  # dots an inch, chosen: sharp on a screen, 1100 pixels for a full-width figure
+WIDTH = 7.0  # inch, the text width of a report
+
+_RC: dict[str, Any] = {
+    "figure.dpi": RESOLUTION,
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.7,
+    "axes.edgecolor": GREY,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#ececec",
+    "grid.linewidth": 0.6,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": BLACK,
+    "ytick.labelcolor": BLACK,
+    "lines.linewidth": 1.4,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "legend.handlelength": 2.0,
+    "savefig.facecolor": "white",
+}
+
+
+def in_style() -> Any:
+    """Context in which figures are drawn and saved; matplotlib's settings are as before afterwards."""
+    return mpl.rc_context(_RC)
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """Empty figure (inches) whose parts are laid out without overlap; needs no display."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save_figure(figure: Figure, file: FilePath) -> FilePath:
+    """Write a PNG under a temporary name, then rename it. Returns ``file``."""
+    part = file.with_name(f".{file.name}.part")
+    figure.savefig(part, format="png", dpi=RESOLUTION)
+    os.replace(part, file)
+    return file
+
+
+def limit_colour(name: str, index: int) -> str:
+    """Colour of a limit; ``index`` is its place among the limits used together."""
+    return LIMIT_COLOURS.get(name, _SPARE[index % len(_SPARE)])
+
+
+def legend_beside(axes: Axes, **options: Any) -> None:
+    """Legend to the right of the axes, where it covers nothing; nothing for axes without labels."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0.2, **options)
