@@ -33,91 +33,139 @@ def _compiled(function: Callable[P, R]) -> Callable[P, R]:
         from numba import njit
     except ImportError:
         return function
-    compiled: Callable[P, R] = njit(cache=True, error_model="numpy")(function)
+    compiled: Callable[P, R] = njit(cache=True, error_model="numpy", nogil=True)(function)
     return compiled
 
 
 @_compiled
 def _bounds_on_u(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float,
-                 x: float) -> tuple[float, float, float, float, float, float]:
-    """Upper and lower bound on u at x in interval i, their slopes, and the bounds that flat rows set on x."""
-    upper, upper_slope = (high - x) / (2 * d), -1 / (2 * d)
-    lower, lower_slope = (low - x) / (2 * d), -1 / (2 * d)
+                 x: float) -> tuple[float, float, float, float, float, float, int, int]:
+    """Upper and lower bound on u at x in interval i, their slopes, the bounds that flat rows set on x, and
+    which rows set the bounds on u (see _row).
+
+    Bounds are kept as fractions and compared crosswise: a division a row would take most of the time.
+    """
+    rows = a.shape[1]
+    n_up, p_up, q_up, up = high - x, 2 * d, 1.0, -1
+    n_low, p_low, q_low, lower = low - x, 2 * d, 1.0, -1
     x_max, x_min = np.inf, -np.inf
     for end in range(2):
         j = i + end
-        for r in range(a.shape[1]):
+        grow = 2 * d * end
+        for r in range(rows):
             q = b[j, r]
-            p = a[j, r] + (2 * d * q if end == 1 else 0.0)
+            p = a[j, r] + grow * q
+            n = c[j, r] - q * x
             if p > _FLAT:
-                value = (c[j, r] - q * x) / p
-                if value < upper:
-                    upper, upper_slope = value, -q / p
+                if n * p_up < n_up * p:
+                    n_up, p_up, q_up, up = n, p, q, end * rows + r
             elif p < -_FLAT:
-                value = (c[j, r] - q * x) / p
-                if value > lower:
-                    lower, lower_slope = value, -q / p
+                if n * p_low < n_low * p:  # n/p > n_low/p_low with p < 0 < p_low
+                    n_low, p_low, q_low, lower = -n, -p, -q, end * rows + r
             elif q > _FLAT:
                 x_max = min(x_max, c[j, r] / q)
             elif q < -_FLAT:
                 x_min = max(x_min, c[j, r] / q)
             elif c[j, r] < -_TOUCH:
                 x_max = -np.inf
-    return upper, upper_slope, lower, lower_slope, x_max, x_min
+    return n_up / p_up, -q_up / p_up, n_low / p_low, -q_low / p_low, x_max, x_min, up, lower
+
+
+@_compiled
+def _row(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float, which: int,
+         is_upper: bool) -> tuple[float, float, float]:
+    """p, q, c of p u + q x <= c: row ``which`` of interval i, counted over both ends; -1 is the next set."""
+    if which < 0:
+        return (2 * d, 1.0, high) if is_upper else (-2 * d, -1.0, -low)
+    rows = a.shape[1]
+    j, r = (i, which) if which < rows else (i + 1, which - rows)
+    grow = 0.0 if which < rows else 2 * d
+    return a[j, r] + grow * b[j, r], b[j, r], c[j, r]
+
+
+@_compiled
+def _crossing(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float, up: int, lower: int,
+              x_cap: float) -> float:
+    """The x above which the rows ``up`` and ``lower`` exclude each other, at most x_cap."""
+    p_up, q_up, c_up = _row(a, b, c, i, d, low, high, up, True)
+    p_low, q_low, c_low = _row(a, b, c, i, d, low, high, lower, False)
+    if p_up > _FLAT and p_low < -_FLAT:
+        fall = q_up / p_up - q_low / p_low
+        if fall > 0:
+            x = (c_up / p_up - c_low / p_low) / fall
+            if 0 < x < x_cap:
+                return x
+    return x_cap
 
 
 @_compiled
 def _end_of_feasible(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float,
-                     x_first: float, x_last: float) -> float:
-    """The feasible x nearest to x_first, going towards x_last; NaN when there is none between them."""
+                     x_first: float, x_last: float) -> tuple[float, int, int]:
+    """The feasible x nearest to x_first, going towards x_last, and the rows that bound u there.
+
+    NaN when there is none between them.
+    """
     down = x_first >= x_last
     x = x_first
     for _ in range(4 * a.shape[1] + 50):
-        upper, upper_slope, lower, lower_slope, x_max, x_min = _bounds_on_u(a, b, c, i, d, low, high, x)
+        upper, upper_slope, lower, lower_slope, x_max, x_min, r_up, r_low = _bounds_on_u(a, b, c, i, d, low,
+                                                                                         high, x)
         if x_max < x - _TOUCH * abs(x):
             if not down:
-                return np.nan
+                return np.nan, -1, -1
             x = x_max
         elif x_min > x + _TOUCH * abs(x):
             if down:
-                return np.nan
+                return np.nan, -1, -1
             x = x_min
         else:
             gap, slope = upper - lower, upper_slope - lower_slope
             if gap >= -_TOUCH * (abs(upper) + abs(lower)):
-                return x
+                return x, r_up, r_low
             if (slope >= 0) if down else (slope <= 0):
-                return np.nan
+                return np.nan, -1, -1
             step = x - gap / slope
             if step == x:
-                return x
+                return x, r_up, r_low
             x = step
         if (x < x_last) if down else (x > x_last):
             if abs(x - x_last) > _TOUCH * max(abs(x_last), abs(x_first)):
-                return np.nan
+                return np.nan, -1, -1
             x = x_last
-    return np.nan
+    return np.nan, -1, -1
 
 
 @_compiled
 def controllable(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, sets: Array) -> int:
     """Backward pass: fills sets (G, 2), the s'^2 from which sets[-1] can be reached.
 
-    Returns the gridpoint whose set is empty, or -1 when none is.
+    Returns the gridpoint whose set is empty, or -1 when none is. The rows that met at one gridpoint mostly
+    meet at the one before as well, and where they cross is a bound to start Newton's method from.
     """
-    for i in range(len(s) - 2, -1, -1):
+    up, lower = -1, -1
+    rest_after = False
+    for i in range(len(s) - 1, -1, -1):
+        rest = True  # whether standing still keeps all rows here
+        for r in range(a.shape[1]):
+            rest = rest and c[i, r] >= 0
+        both, rest_after = rest and rest_after, rest
+        if i == len(s) - 1:
+            continue
         d = s[i + 1] - s[i]
         low, high = sets[i + 1, 0], sets[i + 1, 1]
         x_cap = min(sd2_max[i], SD2_CAP)
-        if d <= 0:  # the two limits at a knot
+        if d <= 0:  # two intervals meet
             sets[i, 0], sets[i, 1] = low, min(high, x_cap)
             if sets[i, 0] > sets[i, 1]:
                 return i
             continue
-        top = _end_of_feasible(a, b, c, i, d, low, high, x_cap, 0.0)
+        first = _crossing(a, b, c, i, d, low, high, up, lower, x_cap)
+        top, up, lower = _end_of_feasible(a, b, c, i, d, low, high, first, 0.0)
         if np.isnan(top):
             return i
-        bottom = _end_of_feasible(a, b, c, i, d, low, high, 0.0, top)
+        bottom = 0.0
+        if low > 0 or not both:
+            bottom, _, _ = _end_of_feasible(a, b, c, i, d, low, high, 0.0, top)
         sets[i, 0], sets[i, 1] = (top if np.isnan(bottom) else bottom), top
     return -1
 
@@ -127,9 +175,39 @@ def fastest(s: Array, a: Array, b: Array, c: Array, sets: Array, start: float, s
     """Forward pass: fills sd2 (G,), the greedy (and optimal) profile inside the controllable sets."""
     sd2[0] = start
     for i in range(len(s) - 1):
-        d = s[i + 1] - s[i]
         x = sd2[i]
-        if d > 0:
-            upper, _, _, _, _, _ = _bounds_on_u(a, b, c, i, d, sets[i + 1, 0], sets[i + 1, 1], x)
-            x = x + 2 * d * upper
+        grow = 2 * (s[i + 1] - s[i])
+        if grow > 0:
+            n_up, p_up = sets[i + 1, 1] - x, grow
+            for r in range(a.shape[1]):
+                n, p = c[i, r] - b[i, r] * x, a[i, r]
+                if p > _FLAT and n * p_up < n_up * p:
+                    n_up, p_up = n, p
+                n, p = c[i + 1, r] - b[i + 1, r] * x, a[i + 1, r] + grow * b[i + 1, r]
+                if p > _FLAT and n * p_up < n_up * p:
+                    n_up, p_up = n, p
+            x = x + grow * (n_up / p_up)
         sd2[i + 1] = min(max(x, sets[i + 1, 0]), sets[i + 1, 1])
+
+
+@_compiled
+def fastest_of_many(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, start: Array, end: Array,
+                    sd2: Array, failed: NDArray[np.intp]) -> None:
+    """Both passes for P paths: s, sd2_max, sd2 (P, G), a, b, c (P, G, R), start, end, failed (P,).
+
+    ``failed`` gets the gridpoint whose set is empty (0 also when the start speed is not in it), or -1; the
+    profile of such a path is NaN.
+    """
+    sets = np.empty((s.shape[1], 2))
+    for p in range(s.shape[0]):
+        sets[-1, 0] = end[p]
+        sets[-1, 1] = end[p]
+        failed[p] = len(sets) - 1 if end[p] > sd2_max[p, -1] * (1 + _TOUCH) else -1
+        if failed[p] < 0:
+            failed[p] = controllable(s[p], a[p], b[p], c[p], sd2_max[p], sets)
+        if failed[p] < 0 and not sets[0, 0] - _TOUCH <= start[p] <= sets[0, 1] * (1 + _TOUCH):
+            failed[p] = 0
+        if failed[p] < 0:
+            fastest(s[p], a[p], b[p], c[p], sets, min(max(start[p], sets[0, 0]), sets[0, 1]), sd2[p])
+        else:
+            sd2[p] = np.nan
