@@ -281,7 +281,7 @@ def best_index(cost: Array, violation: Array) -> int:
     feasible = violation <= FEASIBLE
     if feasible.any():
         return int(np.argmin(np.where(feasible, cost, np.inf)))
-    return int(np.argmin(violation))
+    return int(np.lexsort((cost, violation))[0])
 
 
 def checked_bounds(bounds: ArrayLike, dimension: int | None = None) -> Array:

@@ -23,6 +23,7 @@ from trajopt.optimize.newton import solve_residuals
 Array = NDArray[np.float64]
 
 EXACT = 1e-9  # cost, or wheel error in rad, up to which a solution counts as exact
+_NO_INFLUENCE = 1e-6  # rad/m; a control point that turns no wheel by more has no influence (wheels turn 1/R)
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ def _independent_rows(matrix: Array) -> list[int]:
     """Rows that span the row space (critical wheels can depend on each other)."""
     rows: list[int] = []
     for i in range(len(matrix)):
-        if np.linalg.matrix_rank(matrix[[*rows, i]], tol=1e-9 * np.abs(matrix).max()) == len(rows) + 1:
+        if np.linalg.matrix_rank(matrix[[*rows, i]], tol=_NO_INFLUENCE) == len(rows) + 1:
             rows.append(i)
     if not rows:
         raise ArgumentError("goal.pose", "no turn between start and goal", "a change of heading: without one "

@@ -1,0 +1,114 @@
+"""What lattice and ipopt promise on the thesis's problems."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import SMDW, smdw_problem
+
+from trajopt.objectives.terminal import terminal_objective, with_free
+from trajopt.optimize.base import Budget, Status
+from trajopt.optimize.ipopt import Ipopt
+from trajopt.optimize.lattice import Lattice, lattice_points
+from trajopt.optimize.pso import thesis_enhanced, thesis_first
+from trajopt.optimize.search import minimize
+
+SOLVABLE = [name for name in SMDW if name != "table_5_3_1s"]
+
+
+def through_actuators(name):
+    problem = smdw_problem(name).replace(actuator={"enabled": True, "saturation": 30.0, "dead_zone": 2.3})
+    return terminal_objective(with_free(problem, "p1", "p2", "heading"))
+
+
+@pytest.mark.parametrize("free", [("p2",), ("p1", "p2"), ("p1",)])
+def test_lattice_is_exact_without_actuators(problem, free):
+    objective = terminal_objective(with_free(problem, *free))
+    result = minimize(objective, objective.bounds, optimizer="lattice")
+    if result.status is Status.NO_EXACT:
+        assert free == ("p1",)
+        assert "no lattice point" in result.message
+    else:
+        assert result.fun <= 1e-9
+        assert result.success
+
+
+@pytest.mark.parametrize("name", SOLVABLE)
+def test_lattice_is_exact_through_actuators(name):
+    objective = through_actuators(name)
+    result = minimize(objective, objective.bounds, optimizer="lattice")
+    assert result.fun <= 1e-7
+    assert result.success
+
+
+@pytest.mark.parametrize("name", ["scenario_1_lateral", "scenario_2_forward35"])
+def test_ipopt_is_exact_through_actuators(name):
+    objective = through_actuators(name)
+    result = minimize(objective, objective.bounds, optimizer="ipopt")
+    assert result.fun <= 1e-7
+
+
+def test_ipopt_from_random_starts_without_the_lattice(problem):
+    objective = terminal_objective(problem)
+    result = minimize(objective, objective.bounds, optimizer=Ipopt(lattice_starts=0), seed=3)
+    assert result.fun <= 1e-6
+
+
+def test_lattice_finds_every_solution_that_brute_force_finds(problem):
+    """Root finding from a fine grid of starts, deduplicated, gives the same points."""
+    objective = terminal_objective(problem)
+    part = objective.affine_part()
+    points, _ = lattice_points(part, objective.bounds)
+    inverse = np.linalg.inv(part.matrix)
+    found = set()
+    for x in np.stack(np.meshgrid(*[np.linspace(a, b, 80) for a, b in objective.bounds]), -1).reshape(-1, 2):
+        turns = np.round((part.matrix @ x + part.offset) / part.period)
+        z = inverse @ (part.period * turns - part.offset)
+        if np.all((z >= objective.bounds[:, 0]) & (z <= objective.bounds[:, 1])):
+            found.add(tuple(np.round(z, 9)))
+    assert found == {tuple(np.round(z, 9)) for z in points}
+
+
+def test_without_lattice_points_the_best_of_the_box_is_found(scenario):
+    """A small space holds no lattice point; the arrangement's best vertex beats a fine grid."""
+    small = scenario.replace(space={"x": [0.0, 2.3], "y": [-0.01, 0.8]}).replace({"spline.free": ["p2"]})
+    objective = terminal_objective(small)
+    box = np.array([[1.0, 1.2], [0.1, 0.2]])
+    result = Lattice().minimize(objective, box, rng=np.random.default_rng(0), budget=Budget())
+    assert result.status is Status.NO_EXACT
+    assert "no lattice point lies inside" in result.message
+    grid = np.stack(np.meshgrid(*[np.linspace(a, b, 200) for a, b in box]), -1).reshape(-1, 2)
+    assert result.fun <= objective.evaluate(grid).cost.min() + 1e-9
+
+
+def test_no_turn_between_start_and_goal_is_explained(scenario):
+    from trajopt.errors import ArgumentError
+
+    straight = scenario.replace({"goal.pose": [2.2, 0.76, 0.0]})
+    objective = terminal_objective(straight)
+    with pytest.raises(ArgumentError, match="change of heading"):
+        minimize(objective, objective.bounds, optimizer="lattice")
+
+
+def test_all_four_wheels_cannot_be_had(scenario):
+    every = scenario.replace({"goal.critical": ["front-left", "front-right", "rear-left", "rear-right"]})
+    objective = terminal_objective(every)
+    result = minimize(objective, objective.bounds, optimizer="lattice")
+    assert result.status is Status.NO_EXACT
+    assert "over-determine" in result.message
+
+
+@pytest.mark.parametrize("preset", [thesis_first, thesis_enhanced])
+def test_thesis_presets_have_the_printed_parameters(preset):
+    swarm = preset()
+    assert swarm.particles == 50
+    assert swarm.inertia == 1.0
+    assert swarm.cognitive == swarm.social == (0.45 if preset is thesis_first else 0.15)
+
+
+def test_swarm_stays_inside_with_reset_and_reflect(scenario):
+    objective = terminal_objective(scenario)
+    for name in ("pso", "pso-thesis-enhanced"):
+        samples = minimize(objective, objective.bounds, optimizer=name, budget=Budget(evaluations=2000)).history.samples
+        assert np.all(samples >= objective.bounds[:, 0] - 1e-12)
+        assert np.all(samples <= objective.bounds[:, 1] + 1e-12)
