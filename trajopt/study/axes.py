@@ -73,7 +73,8 @@ def axis_values(name: str, axis: Mapping[str, Any]) -> Array:
         raise ArgumentError(where, values, "[from, to, count] with a whole count >= 1")
     low, high, count = values
     if given[0] == "range":
-        return as_column(where, np.asarray(np.linspace(low, high, count)))
+        evenly: Array = np.linspace(low, high, count)
+        return as_column(where, evenly)
     if not (low > 0 and high > 0):
         raise ArgumentError(where, values, "[from, to, count] with from and to > 0")
     return as_column(where, np.geomspace(low, high, count))
@@ -111,8 +112,9 @@ def _independent(name: str, spec: Mapping[str, Any]) -> Array:
         raise ArgumentError(f"axes.{name}.random", dict(spec), "a whole seed >= 0 and a whole count >= 1")
     digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
     rng = np.random.default_rng([int(seed), int.from_bytes(digest, "little")])  # type: ignore[arg-type]
+    draws: Array = rng.random((int(count),))  # type: ignore[arg-type]
     shape = {k: v for k, v in spec.items() if k not in ("seed", "count")}
-    return as_column(name, _quantile(f"axes.{name}.random", shape)(rng.random(count)))
+    return as_column(name, _quantile(f"axes.{name}.random", shape)(draws))
 
 
 def _joint(sample: Mapping[str, Any]) -> dict[str, Array]:

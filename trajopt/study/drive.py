@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,10 @@ _STOP_GRACE = 20.0  # s that workers get to store what they have after a stop; c
 _MOST_REBUILDS = 1_000  # of executors, before something else must be wrong; chosen
 
 Array = NDArray[np.int64]
+
+
+class WorkerStartError(TrajoptError):
+    """Worker processes cannot start."""
 
 
 @dataclass(frozen=True)
@@ -98,9 +103,8 @@ class Drive:
         mark = stop_mark(self.setup.store.path, self.setup.run_id)
         flights: dict[Future[ChunkReport], _Chunk] = {}
         rebuilds = 0
-        context = self.engine.start()
+        context, executor = self._started()
         try:
-            executor = context.__enter__()
             while flights or self._waiting():
                 try:
                     self._submit(executor, flights)
@@ -111,8 +115,7 @@ class Drive:
                 if broken:
                     rebuilds += 1
                     self._blame(flights)
-                    context = self._rebuilt(context, rebuilds)
-                    executor = context.__enter__()
+                    context, executor = self._rebuilt(context, rebuilds)
         except BaseException:  # Ctrl-C, a full disk: let the workers keep what they have, then pass it on
             self._stop(flights, mark)
             raise
@@ -249,7 +252,24 @@ class Drive:
                 self._died(chunk)
         flights.clear()
 
-    def _rebuilt(self, context: AbstractContextManager[Executor], rebuilds: int) -> AbstractContextManager[Executor]:
+    def _started(self) -> tuple[AbstractContextManager[Executor], Executor]:
+        """A working executor. One whose workers cannot even start is no case's fault: raises WorkerStartError."""
+        for _ in range(RETRIES + 1):
+            context = self.engine.start()
+            executor = context.__enter__()
+            try:
+                executor.submit(os.getpid).result()
+                return context, executor
+            except BaseException as error:
+                with contextlib.suppress(BrokenExecutor):
+                    context.__exit__(None, None, None)
+                if not isinstance(error, BrokenExecutor) and not _is_death(error):
+                    raise
+        raise WorkerStartError(f"{self.engine.name}: workers die at their start, before any case; a script that runs a "
+                               "sweep needs `if __name__ == \"__main__\":` around what it does")
+
+    def _rebuilt(self, context: AbstractContextManager[Executor],
+                 rebuilds: int) -> tuple[AbstractContextManager[Executor], Executor]:
         with contextlib.suppress(BrokenExecutor):
             context.__exit__(None, None, None)
         if not self.engine.rebuilds or rebuilds > _MOST_REBUILDS:
@@ -257,7 +277,7 @@ class Drive:
                                  "are kept: run the sweep again, or give a factory instead of an executor")
         if self.seconds_a_case is None and rebuilds > RETRIES:
             self.seconds_a_case = SHORTEST_CHUNK  # the sampled cases kill their worker: go on with small chunks
-        return self.engine.start()
+        return self._started()
 
     def _stop(self, flights: dict[Future[ChunkReport], Any], mark: Path) -> None:
         self.stopping = True
@@ -283,10 +303,6 @@ def sampled(table: CaseTable, count: int = SAMPLED) -> CaseTable:
     return table.take(places)
 
 
-def with_kinds(job: ChunkJob, kinds: Mapping[str, Kind]) -> ChunkJob:
-    return replace(job, kinds=kinds)
-
-
-def _is_death(error: Exception) -> bool:
+def _is_death(error: BaseException) -> bool:
     """Whether an error of a future says that the worker is gone (Dask; its classes are not imported here)."""
     return type(error).__name__ in ("KilledWorker", "CancelledError", "FutureCancelledError", "CommClosedError")

@@ -56,7 +56,8 @@ def unpacked(run: Packed) -> RunFunction:
 
 def name_of(run: RunFunction) -> str:
     """Name that goes into identities: module and qualified name, of the class for a callable object."""
-    named = run if hasattr(run, "__qualname__") else type(run)
+    function = getattr(run, "func", run)  # functools.partial
+    named = function if hasattr(function, "__qualname__") else type(function)
     module = _module_of(run)
     return f"{'__main__' if module == '__mp_main__' else module}:{named.__qualname__}"
 

@@ -1,0 +1,275 @@
+"""The commands ``trajopt sweep ...``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from trajopt.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from trajopt.study.drive import Progress
+    from trajopt.study.engines import Engine
+    from trajopt.study.store import Store
+    from trajopt.study.sweepfile import SweepPlan
+
+app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False,
+                  help="Run a study over many cases, on one machine or on a cluster, and lose nothing.")
+console = Console()
+
+_SHOWN = 5  # cases shown by --dry-run
+
+SweepFile = Annotated[Path, typer.Argument(help="sweep file (*.toml)", show_default=False)]
+StorePath = Annotated[Path, typer.Argument(help="store of a sweep (its directory)", show_default=False)]
+StoreOption = Annotated[Path | None, typer.Option("--store", help="store; default: out/sweeps/<name of the file>")]
+Workers = Annotated[int, typer.Option(help="worker processes or jobs (0: all processors)")]
+EngineName = Annotated[str, typer.Option("--engine", help="processes, dask, dask-slurm, or tcp://host:port of a "
+                                                          "Dask scheduler")]
+Host = Annotated[str, typer.Option(help="address at which Dask's servers listen")]
+
+
+@app.command()
+def run(sweep_file: SweepFile, store: StoreOption = None, workers: Workers = 0, engine: EngineName = "processes",
+        host: Host = "127.0.0.1",
+        dry_run: Annotated[bool, typer.Option(help="show cases and an estimate of the time; store nothing")] = False,
+        ) -> None:
+    """Run every case that has no row yet."""
+    from trajopt.study.sweepfile import load_sweep
+
+    plan = load_sweep(sweep_file)
+    if dry_run:
+        _dry_run(plan, workers)
+        return
+    _go(plan, store or _default_store(sweep_file), _engine(engine, workers, host), retry_failed=False)
+
+
+@app.command("retry-failed")
+def retry_failed(sweep_file: SweepFile, store: StoreOption = None, workers: Workers = 0,
+                 engine: EngineName = "processes", host: Host = "127.0.0.1") -> None:
+    """Run cases again that failed, timed out or crashed, and those without a row."""
+    from trajopt.study.sweepfile import load_sweep
+
+    _go(load_sweep(sweep_file), store or _default_store(sweep_file), _engine(engine, workers, host),
+        retry_failed=True)
+
+
+@app.command()
+def submit(sweep_file: SweepFile, store: StoreOption = None,
+           slurm: Annotated[bool, typer.Option("--slurm", help="as a Slurm job array")] = False,
+           elements: Annotated[int, typer.Option(help="array elements (0: by measured time)")] = 0,
+           at_once: Annotated[int, typer.Option(help="elements running together (0: no limit)")] = 0,
+           time_: Annotated[str, typer.Option("--time", help="time limit of an element")] = "01:00:00",
+           memory: Annotated[str, typer.Option(help="memory of an element")] = "2G",
+           partition: Annotated[str | None, typer.Option(help="Slurm partition")] = None,
+           wait: Annotated[bool, typer.Option(help="wait until the array has ended")] = False,
+           failed: Annotated[bool, typer.Option("--retry-failed", help="failed cases too")] = False) -> None:
+    """Hand the missing cases to Slurm and return; nothing here needs to stay alive."""
+    from trajopt.study.host import CaseLimits
+    from trajopt.study.slurm import SlurmOptions
+    from trajopt.study.slurm import submit as hand_over
+    from trajopt.study.store import open_store
+    from trajopt.study.sweepfile import load_sweep
+
+    if not slurm:
+        raise ArgumentError("--slurm", False, "--slurm: job arrays are submitted to Slurm only")
+    plan = load_sweep(sweep_file)
+    place = open_store(store or _default_store(sweep_file))
+    done = hand_over(plan.table, plan.run, place, limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
+                     options=SlurmOptions(time_, memory, partition, at_once, elements), source=plan.text,
+                     retry_failed=failed, wait=wait)
+    if not done.job:
+        console.print("nothing is missing")
+    else:
+        console.print(f"job {done.job}: {done.cases} cases in {done.elements} elements; store {place.path}")
+
+
+@app.command()
+def status(store: StorePath) -> None:
+    """Cases by status, the last runs, and the commonest errors."""
+    from trajopt.study.store import open_store
+
+    place = open_store(store, create=False)
+    counts, runs = place.counts(), place.runs()
+    shown = Table("status", "cases", title=str(store), title_justify="left")
+    for name, count in counts.items():
+        shown.add_row(name, str(count))
+    if runs:
+        shown.add_row("missing (of the last sweep)", str(max(0, int(runs[-1]["cases"]) - sum(counts.values()))))
+    console.print(shown)
+    listing = Table("run", "state", "engine", "missing then", "commit", title="runs", title_justify="left")
+    for entry in runs[-_SHOWN:]:
+        listing.add_row(entry["run"], entry["state"], entry["engine"], str(entry["missing"]),
+                        str(entry["commit"])[:10])
+    console.print(listing)
+    _print_errors(place)
+
+
+@app.command()
+def show(store: StorePath, case: Annotated[str, typer.Argument(help="first digits of a case")]) -> None:
+    """One case: its values, results, arrays, and the traceback of its error."""
+    from trajopt.study.store import open_store
+
+    row, arrays = open_store(store, create=False).case(case)
+    shown = Table("name", "value", title=f"case {row['case']}", title_justify="left")
+    for name, value in row.items():
+        if value is not None and name not in ("case", "error_traceback"):
+            shown.add_row(name, str(value))
+    for name, array in arrays.items():
+        shown.add_row(name, f"array {array.shape}")
+    console.print(shown)
+    if row.get("error_traceback"):
+        console.print(row["error_traceback"], markup=False, highlight=False)
+
+
+@app.command()
+def compact(store: StorePath) -> None:
+    """Merge the parts of a store into large ones."""
+    from trajopt.study.store import open_store
+
+    before, after = open_store(store, create=False).compact()
+    console.print(f"{before} parts before, {after} after")
+
+
+@app.command()
+def export(store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]) -> None:
+    """Write all rows, one a case, to one file."""
+    from trajopt.study.store import open_store
+
+    place = open_store(store, create=False)
+    match out.suffix:
+        case ".csv":
+            place.frame().to_csv(out, index=False)
+        case ".jsonl":
+            place.frame().to_json(out, orient="records", lines=True, date_format="iso")
+        case ".parquet":
+            import pyarrow.parquet as pq
+
+            pq.write_table(place.table(), out)
+        case _:
+            raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
+    console.print(f"written to {out}")
+
+
+def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> None:
+    from trajopt.study.store import open_store
+    from trajopt.study.sweeps import missing, sweep
+
+    place = open_store(store)
+    left = len(missing(plan.table, place, retry_failed=retry_failed))
+    console.print(f"{plan.title}: {len(plan.table)} cases, {left} to run on {engine.name}; store {store}")
+    with _ending_cleanly(), _bar(left) as report:
+        sweep(plan.table, plan.run, executor=engine, store=place, time_limit=plan.time_limit,
+              memory_limit=plan.memory_limit, retry_failed=retry_failed, source=plan.text, progress=report)
+    console.print(", ".join(f"{count} {name}" for name, count in place.counts().items()))
+    _print_errors(place)
+
+
+def _dry_run(plan: SweepPlan, workers: int) -> None:
+    """Count, first cases, and the time that three sampled cases take, in a store that is thrown away."""
+    import tempfile
+
+    import numpy as np
+
+    from trajopt.study.drive import sampled
+    from trajopt.study.engines import available_processors
+    from trajopt.study.sweeps import sweep
+
+    console.print(f"{plan.title}: {len(plan.table)} cases")
+    first = plan.table.take(np.arange(min(_SHOWN, len(plan.table)))).rows()
+    shown = Table("case", *plan.table.columns)
+    for case in first:
+        shown.add_row(case.id[:12], *(f"{v:.6g}" if isinstance(v, float) else str(v) for v in case.values.values()))
+    console.print(shown)
+    with tempfile.TemporaryDirectory() as folder, _ending_cleanly():
+        store = sweep(sampled(plan.table), plan.run, executor=1, store=Path(folder) / "trial",
+                      time_limit=plan.time_limit, memory_limit=plan.memory_limit)
+        frame = store.frame(["run_seconds", "error", "error_message"])
+    seconds = float(frame["run_seconds"].median())
+    count = workers or available_processors()
+    console.print(f"three sampled cases took {', '.join(f'{s:.3g} s' for s in frame['run_seconds'])}; "
+                  f"about {_duration(seconds * len(plan.table) / count)} on {count} workers")
+    for _, row in frame[frame["status"] != "done"].iterrows():
+        console.print(f"[red]{row['status']}[/red] {row['case'][:12]}: {row['error']}: {row['error_message']}")
+
+
+def _print_errors(store: Store) -> None:
+    frame = store.frame(["error", "error_message"])
+    failed = frame[frame["status"] != "done"]
+    if failed.empty:
+        return
+    shown = Table("cases", "error", "first message", "first case", title="not done", title_justify="left")
+    for error, group in failed.groupby("error"):
+        message, case = group["error_message"].iloc[0], group["case"].iloc[0]
+        shown.add_row(str(len(group)), str(error), str(message)[:100], case[:12])
+    console.print(shown)
+
+
+def _default_store(sweep_file: Path) -> Path:
+    return Path("out") / "sweeps" / sweep_file.stem
+
+
+def _engine(name: str, workers: int, host: str) -> Engine:
+    from trajopt.study import engines
+
+    count = workers or engines.available_processors()
+    if name == "processes":
+        return engines.processes(count)
+    if name == "dask":
+        return engines.dask_local(count, host=host)
+    if name == "dask-slurm":
+        return engines.dask_slurm(count, host=host)
+    if "://" in name:
+        return engines.dask_at(name)
+    raise ArgumentError("engine", name, "processes, dask, dask-slurm, or tcp://host:port")
+
+
+@contextmanager
+def _ending_cleanly() -> Iterator[None]:
+    """SIGTERM ends a sweep as Ctrl-C does: finished cases are kept."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
+    """Progress with rate and remaining time on a terminal; a line a minute where there is none."""
+    from rich import progress as bars
+
+    bar = bars.Progress(bars.TextColumn("{task.fields[failed]}"), bars.BarColumn(), bars.MofNCompleteColumn(),
+                        bars.TextColumn("{task.fields[rate]}"), bars.TimeElapsedColumn(),
+                        console=Console(stderr=True), disable=not sys.stderr.isatty())
+    task: Any = bar.add_task("", total=total, failed="", rate="")
+    said = [time.monotonic()]
+
+    def report(now: Progress) -> None:
+        failed = now.finished - now.counts.get("done", 0)
+        rate = now.finished / max(now.seconds, 1e-9)
+        left = now.remaining_seconds
+        text = f"{rate:.3g} cases/s, {_duration(left) if left is not None else '?'} left"
+        bar.update(task, completed=now.finished, failed=f"{failed} failed" if failed else "", rate=text)
+        if not sys.stderr.isatty() and time.monotonic() - said[0] > 60:
+            said[0] = time.monotonic()
+            print(f"{now.finished} of {now.total}, {failed} failed, {text}", file=sys.stderr, flush=True)
+
+    with bar:
+        yield report
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.3g} s"
+    return f"{seconds / 60:.3g} min" if seconds < 5400 else f"{seconds / 3600:.3g} h"

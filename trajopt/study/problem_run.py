@@ -1,0 +1,90 @@
+"""The run function of sweeps over problem files: change the problem, solve it, and drive it where asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from trajopt.errors import ArgumentError
+from trajopt.maneuver_problem import ManeuverProblem
+from trajopt.problem import Problem
+from trajopt.study.cases import Case
+
+RUN_NAMES = ("run.optimizer", "run.seed", "run.engine", "run.evaluations")
+ENGINES = ("none", "pybullet", "mujoco")
+
+
+@dataclass(frozen=True)
+class SolveOptions:
+    """How problems are solved: ``optimizer``, budget in ``evaluations`` (0: the default), and the physics
+    ``engine`` that drives the result ("none": it is not driven)."""
+
+    optimizer: str = "auto"
+    evaluations: int = 0
+    engine: str = "none"
+
+    def __post_init__(self) -> None:
+        if self.engine not in ENGINES:
+            raise ArgumentError("solve.engine", self.engine, "one of " + ", ".join(ENGINES))
+        if self.evaluations < 0:
+            raise ArgumentError("solve.evaluations", self.evaluations, "a whole number >= 0")
+
+
+@dataclass(frozen=True)
+class ProblemRun:
+    """Solves ``problem`` with a case's values put in.
+
+    Names with a dot are keys of the problem, except ``run.optimizer``, ``run.seed``, ``run.engine`` and
+    ``run.evaluations``; without ``run.seed`` the case's own seed is used. Names without a dot are left alone.
+    """
+
+    problem: Problem
+    options: SolveOptions
+
+    def __call__(self, case: Case) -> dict[str, Any]:
+        from trajopt.optimize.base import Budget
+        from trajopt.pipeline import solve, validate
+
+        problem = self.problem.replace(changes(case.values))
+        evaluations = int(case.values.get("run.evaluations", self.options.evaluations))
+        solution = solve(problem, optimizer=str(case.values.get("run.optimizer", self.options.optimizer)),
+                         seed=int(case.values.get("run.seed", case.seed)),
+                         budget=Budget(evaluations=evaluations) if evaluations else None)
+        row: dict[str, Any] = {
+            "cost": solution.cost, "terms": solution.terms, "evaluations": solution.evaluations,
+            "holds": solution.holds, "faults": "; ".join(solution.faults), "search": solution.search.status,
+            "margins": solution.margins, "pose_error": np.asarray(solution.deviation).tolist(),
+            "wheel_error": np.asarray(solution.wheel_deviation).tolist(), "control_points": solution.control_points,
+        }
+        trajectory = solution.trajectory
+        if trajectory is None:
+            return row
+        row["duration"] = trajectory.duration
+        engine = str(case.values.get("run.engine", self.options.engine))
+        if engine != "none":
+            report = validate(trajectory, problem, engine=engine)
+            row["driven"] = {"along": report.along, "across": report.across, "yaw": report.yaw,
+                             "wheel_error": np.asarray(report.wheel_deviation).tolist(),
+                             "path_rms": report.path_rms, "path_max": report.path_max}
+            row["driven_pose"] = report.recording.pose
+            row["driven_times"] = report.recording.times
+        return row
+
+
+def changes(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of a case that are keys of a problem."""
+    return {k: v for k, v in values.items() if "." in k and k not in RUN_NAMES}
+
+
+@dataclass(frozen=True)
+class WithProblem:
+    """A user's function of case and problem, as a run function."""
+
+    function: Callable[[Case, Any], Any]
+    problem: Problem | ManeuverProblem
+
+    def __call__(self, case: Case) -> Any:
+        return self.function(case, self.problem.replace(changes(case.values)))
