@@ -12,7 +12,8 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path as FilePath
-from typing import Annotated, Any, Literal, Self
+from types import UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -26,6 +27,10 @@ from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
+
+if TYPE_CHECKING:
+    from trajopt.maneuver_problem import ManeuverProblem
+    from trajopt.path_problem import PathProblem
 
 WheelName = Literal["front-left", "front-right", "rear-left", "rear-right"]
 WHEELS: tuple[WheelName, ...] = ("front-left", "front-right", "rear-left", "rear-right")
@@ -42,24 +47,24 @@ Wheels4 = tuple[float, float, float, float]
 _SINGULAR_PAIRS = ({"front-left", "rear-right"}, {"front-right", "rear-left"})
 
 
-class _Section(BaseModel):
+class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class RobotSection(_Section):
+class RobotSection(Section):
     """Which robot moves."""
 
     name: Literal["loc8"] = Field("loc8", description="robot of the package")
 
 
-class Start(_Section):
+class Start(Section):
     """Where the motion starts, at rest."""
 
     pose: Pose = Field(description="x, y, yaw: m, m, rad")
     wheels: Wheels4 = Field((0.0, 0.0, 0.0, 0.0), description="wheel angles FL, FR, RL, RR, rad")
 
 
-class Goal(_Section):
+class Goal(Section):
     """Where it ends: pose and wheel angles; only the critical wheels' angles count."""
 
     pose: Pose = Field(description="x, y, yaw: m, m, rad")
@@ -74,14 +79,14 @@ class Goal(_Section):
     @model_validator(mode="after")
     def _independent(self) -> Self:
         if len(set(self.critical)) != len(self.critical):
-            raise _rule("critical", list(self.critical), "each wheel once")
+            raise broken_rule("critical", list(self.critical), "each wheel once")
         if len(self.critical) == 2 and set(self.critical) in _SINGULAR_PAIRS:
-            raise _rule("critical", list(self.critical), "two wheels that are not diagonally opposite "
+            raise broken_rule("critical", list(self.critical), "two wheels that are not diagonally opposite "
                         "(diagonal wheels cannot be set independently)")
         return self
 
 
-class Space(_Section):
+class Space(Section):
     """Navigation space: where control points may lie."""
 
     x: Interval = Field(description="from, to, m")
@@ -92,14 +97,14 @@ class Space(_Section):
         for axis in ("x", "y"):
             low, high = getattr(self, axis)
             if not low < high:
-                raise _rule(axis, [low, high], "an interval [from, to] with from < to")
+                raise broken_rule(axis, [low, high], "an interval [from, to] with from < to")
         return self
 
     def contains(self, x: float, y: float) -> bool:
         return self.x[0] <= x <= self.x[1] and self.y[0] <= y <= self.y[1]
 
 
-class Spline(_Section):
+class Spline(Section):
     """Natural cubic spline through start, P1, P2, goal; which of its control values are searched."""
 
     duration: Positive = Field(description="nominal duration, s: what a search through actuators assumes")
@@ -108,13 +113,13 @@ class Spline(_Section):
     @model_validator(mode="after")
     def _once(self) -> Self:
         if len(set(self.free)) != len(self.free):
-            raise _rule("free", list(self.free), "each name once")
+            raise broken_rule("free", list(self.free), "each name once")
         if set(self.free) == {"duration"}:
-            raise _rule("free", list(self.free), "at least one of p1, p2, heading")
+            raise broken_rule("free", list(self.free), "at least one of p1, p2, heading")
         return self
 
 
-class ObjectiveSection(_Section):
+class ObjectiveSection(Section):
     """Terminal cost of thesis 000, Table 4.4, or the duration that time scaling needs."""
 
     kind: Literal["terminal", "duration"] = "terminal"
@@ -131,7 +136,7 @@ class ObjectiveSection(_Section):
         return 2 * math.pi if self.wheel_period == "2pi" else math.pi
 
 
-class ActuatorSection(_Section):
+class ActuatorSection(Section):
     """Saturation and dead-zone of the wheel drives, for searches that predict through them."""
 
     enabled: bool = False
@@ -141,11 +146,11 @@ class ActuatorSection(_Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.dead_zone >= self.saturation:
-            raise _rule("dead_zone", self.dead_zone, f"a speed below saturation = {self.saturation} rad/s")
+            raise broken_rule("dead_zone", self.dead_zone, f"a speed below saturation = {self.saturation} rad/s")
         return self
 
 
-class Limits(_Section):
+class Limits(Section):
     """Limits of time scaling; leave a key out to leave that limit out."""
 
     speed: Positive | None = Field(None, description="translational speed, m/s")
@@ -172,7 +177,7 @@ class Limits(_Section):
         return tuple(found)
 
 
-class Scene(_Section):
+class Scene(Section):
     """What the robot meets at the goal."""
 
     obstacle_height: NonNegative = Field(0.0, description="step height, m (0: flat)")
@@ -180,7 +185,7 @@ class Scene(_Section):
     friction: Positive = Field(0.8, description="ground friction in the physics check")
 
 
-class Problem(_Section):
+class Problem(Section):
     """A whole problem. ``source`` is the file it came from; ``replace`` makes changed copies."""
 
     title: str
@@ -199,20 +204,20 @@ class Problem(_Section):
     def _consistent(self) -> Self:
         for name, pose in (("start", self.start.pose), ("goal", self.goal.pose)):
             if not self.space.contains(pose[0], pose[1]):
-                raise _rule(f"{name}.pose", list(pose), f"a position inside space x {list(self.space.x)}, "
+                raise broken_rule(f"{name}.pose", list(pose), f"a position inside space x {list(self.space.x)}, "
                                                         f"y {list(self.space.y)}")
         if math.dist(self.start.pose[:2], self.goal.pose[:2]) < 1e-6:
-            raise _rule("goal.pose", list(self.goal.pose), "a position different from start.pose")
+            raise broken_rule("goal.pose", list(self.goal.pose), "a position different from start.pose")
         if (self.limits.acceleration is None) != (self.limits.deceleration is None):
-            raise _rule("limits.deceleration", self.limits.deceleration,
+            raise broken_rule("limits.deceleration", self.limits.deceleration,
                         "acceleration and deceleration both given or both left out")
         if self.objective.kind == "duration" and self.actuator.enabled:
-            raise _rule("actuator.enabled", True, "false with objective.kind = \"duration\": a time-scaled "
+            raise broken_rule("actuator.enabled", True, "false with objective.kind = \"duration\": a time-scaled "
                         "motion keeps wheel speeds within limits, so no actuator saturates")
         if self.objective.kind == "duration" and "duration" in self.spline.free:
-            raise _rule("spline.free", list(self.spline.free), "no duration: time scaling chooses it")
+            raise broken_rule("spline.free", list(self.spline.free), "no duration: time scaling chooses it")
         if not self.limits.as_limits():
-            raise _rule("limits", {}, "at least one limit")
+            raise broken_rule("limits", {}, "at least one limit")
         return self
 
     def replace(self, changes: Mapping[str, Any] | None = None, /, **sections: Any) -> Problem:
@@ -223,7 +228,7 @@ class Problem(_Section):
         """
         data = self.model_dump(mode="json", exclude_none=True)
         for key, value in (changes or {}).items():
-            _assign(data, key.split("."), value, self.source)
+            set_key(data, key.split("."), value, self.source)
         for name, value in sections.items():
             if isinstance(value, Mapping) and isinstance(data.get(name), dict):
                 data[name].update(value)
@@ -232,28 +237,43 @@ class Problem(_Section):
         return _validated(data, self.source)
 
 
-def _rule(key: str, value: Any, expected: str) -> PydanticCustomError:
+def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
     """A broken rule of this module; carried through pydantic to become a ProblemError."""
     return PydanticCustomError("trajopt_rule", "{expected}", {"key": key, "given": value, "expected": expected})
 
 
-def load_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = None) -> Problem:
+def load_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = None
+                 ) -> Problem | PathProblem | ManeuverProblem:
     """Problem from a TOML file; ``overrides`` maps dotted keys to values.
+
+    A file with a table [path] gives its path instead of asking for a search: a PathProblem. One with a table
+    [obstacle] leaves the goal to the manoeuvre planner: a ManeuverProblem.
 
     Raises ProblemError, in one line: file, key, value, and what would be right.
     """
-    file = FilePath(path)
+    data = _tables(path)
+    for key, value in (overrides or {}).items():
+        set_key(data, key.split("."), value, str(path))
+    if "path" in data:
+        from trajopt.path_problem import path_problem_from  # it builds on this module
+
+        return path_problem_from(data, str(path))
+    if "obstacle" in data:
+        from trajopt.maneuver_problem import maneuver_from  # so does this
+
+        return maneuver_from(data, str(path))
+    return _validated(data, str(path))
+
+
+def _tables(path: str | FilePath) -> dict[str, Any]:
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(FilePath(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ProblemError(str(path), "file", "missing", "an existing problem file (*.toml)") from None
     except IsADirectoryError:
         raise ProblemError(str(path), "file", "a directory", "a problem file (*.toml)") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ProblemError(str(path), "file", str(error), "valid TOML in UTF-8") from None
-    for key, value in (overrides or {}).items():
-        _assign(data, key.split("."), value, str(path))
-    return _validated(data, str(path))
 
 
 def problem_schema() -> str:
@@ -263,12 +283,13 @@ def problem_schema() -> str:
     return json.dumps(schema, indent=2) + "\n"
 
 
-def _assign(data: dict[str, Any], keys: list[str], value: Any, file: str) -> None:
+def set_key(data: dict[str, Any], keys: list[str], value: Any, file: str) -> None:
     """Set a nested key, making tables on the way; unknown names are left to validation."""
     for depth, key in enumerate(keys[:-1]):
         data = data.setdefault(key, {})
         if not isinstance(data, dict):
-            raise ProblemError(file, ".".join(keys), value, f"a key below a table ({'.'.join(keys[: depth + 1])} is none)")
+            none = ".".join(keys[: depth + 1])
+            raise ProblemError(file, ".".join(keys), value, f"a key below a table ({none} is none)")
     data[keys[-1]] = value
 
 
@@ -279,10 +300,10 @@ def _validated(data: dict[str, Any], file: str) -> Problem:
         # Through JSON, because only there does strict mode take arrays for tuples.
         return Problem.model_validate_json(json.dumps({**data, "source": file}, default=str), strict=True)
     except ValidationError as error:
-        raise _translated(error, data, file) from None
+        raise translated(error, file, Problem) from None
 
 
-def _translated(error: ValidationError, data: dict[str, Any], file: str) -> ProblemError:
+def translated(error: ValidationError, file: str, model: type[BaseModel]) -> ProblemError:
     """One line for the first finding, in the words of problem files."""
     first = error.errors()[0]
     place = [str(part) for part in first["loc"]]
@@ -291,7 +312,7 @@ def _translated(error: ValidationError, data: dict[str, Any], file: str) -> Prob
         return ProblemError(file, ".".join([*place, context["key"]]), context["given"], context["expected"])
     key = _joined(first["loc"])
     if first["type"] == "extra_forbidden":
-        known = _known_keys(place[:-1])
+        known = _known_keys(place[:-1], model)
         near = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.0)
         return ProblemError(file, key, first["input"], f"a known key; the nearest is '{near[0]}'")
     if first["type"] == "missing":
@@ -309,8 +330,11 @@ def _joined(location: tuple[int | str, ...]) -> str:
     return text
 
 
-def _known_keys(section: list[str]) -> list[str]:
-    model: Any = Problem
+def _known_keys(section: list[str], whole: type[BaseModel]) -> list[str]:
+    model: Any = whole
     for name in section:
+        if name.isdigit():  # an element of an array of tables
+            continue
         model = model.model_fields[name].annotation
+        model = get_args(model)[0] if get_origin(model) in (tuple, Union, UnionType) else model
     return [key for key in model.model_fields if key != "source"]

@@ -1,0 +1,241 @@
+"""On-line replanning among moving obstacles: slow down, stop, resume, along an unchanged path.
+
+Every scan the replanner chooses the speeds of one more cycle and, behind them, a full brake to rest. A choice
+is accepted only if the outline, driven through committed motion, cycle and brake, meets none of the places
+that a seen obstacle can reach by then, and if nothing that was beyond the sensor's range can be met either.
+Otherwise the brake accepted one cycle earlier is executed: so if the first state is safe, every state is
+(passive safety: nothing is hit while the robot moves). The path never changes, so the distance is conserved.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.control.encounter import Course, Obstacle, clearance
+from trajopt.errors import ArgumentError
+
+Array = NDArray[np.float64]
+
+TIME_STEP = 0.02  # s between samples of a plan; chosen
+_LEVELS = 9  # accelerations tried a cycle, from full braking to full acceleration; chosen
+_CREEP = 0.05  # m/s; the halving rule stops below it; chosen
+_PLACE = 1e-6  # m; nearer than this to the end counts as arrived
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """``reach`` (m) around the outline, a scan every ``scan_time`` (s), effect after ``reaction_time`` (s).
+
+    ``unseen_speed`` (m/s) bounds how fast something that is not yet seen may come.
+    """
+
+    reach: float
+    scan_time: float
+    reaction_time: float
+    unseen_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("reach", "scan_time"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
+                raise ArgumentError(f"sensor.{name}", getattr(self, name), "a finite value > 0")
+        for name in ("reaction_time", "unseen_speed"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise ArgumentError(f"sensor.{name}", getattr(self, name), "a finite value >= 0")
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedPlan:
+    """Path parameter ``s`` (m) and speed ``v`` (m/s), arrays (N,), every TIME_STEP from time ``start`` (s).
+
+    It ends at rest and stays there.
+    """
+
+    start: float
+    s: Array
+    v: Array
+
+    def sampled(self, first: float, count: int) -> tuple[Array, Array]:
+        """s and v at ``count`` samples from time ``first`` on."""
+        index = np.clip(round((first - self.start) / TIME_STEP) + np.arange(count), 0, len(self.s) - 1)
+        return self.s[index], self.v[index]
+
+
+def at_rest(now: float, s: float = 0.0) -> SpeedPlan:
+    """Standing still at path parameter ``s``."""
+    return SpeedPlan(now, np.array([s]), np.zeros(1))
+
+
+def replan(where: Course, sensor: Sensor, current: SpeedPlan, now: float, seen: Sequence[Obstacle]) -> SpeedPlan:
+    """The plan from time ``now`` (a scan) on; ``current`` is the one under way, ``seen`` what the scan shows.
+
+    The fastest accepted choice for the cycle that starts after the reaction time; else ``current`` itself,
+    which ends in a brake. ``seen`` must hold every obstacle within reach of the outline.
+    """
+    delay = round(sensor.reaction_time / TIME_STEP)
+    cycle = max(round(sensor.scan_time / TIME_STEP), 1)
+    committed_s, committed_v = current.sampled(now, delay + 1)
+    choices = _choices(where, float(committed_s[-1]), float(committed_v[-1]), cycle)
+    for tail_s, tail_v in choices:
+        s = np.concatenate([committed_s, tail_s])
+        v = np.concatenate([committed_v, tail_v])
+        if _accepted(where, sensor, s, v, seen):
+            return SpeedPlan(now, s, v)
+    rest = len(current.s) - round((now - current.start) / TIME_STEP)
+    s, v = current.sampled(now, max(rest, 1))
+    return SpeedPlan(now, s, v)
+
+
+def stops_in_time(where: Course, sensor: Sensor, plan: SpeedPlan, seen: Sequence[Obstacle]) -> bool:
+    """Whether ``plan``, from its start to rest, is clear of all that it knows and of all that it cannot see."""
+    return _accepted(where, sensor, plan.s, plan.v, seen)
+
+
+def halving_plan(where: Course, sensor: Sensor, current: SpeedPlan, now: float,
+                 seen: Sequence[Obstacle]) -> SpeedPlan:
+    """The thesis's rule (section 3.6): half a cycle on, then half the speed; resume by doubling.
+
+    An obstacle counts as in the way when it is within reach of the outline ahead. It promises nothing: the
+    stopping distance is not looked at. The recovery is ambiguous in the thesis; here the speed doubles every
+    cycle, from a creep, up to the plan's.
+    """
+    half = max(round(sensor.scan_time / 2 / TIME_STEP), 1)
+    s0, v0 = (float(x[0]) for x in current.sampled(now, 1))
+    slower = 0.5 * v0 if 0.5 * v0 > _CREEP else 0.0
+    wanted = [v0] * half + [slower] * half if seen else [max(2 * v0, 2 * _CREEP)] * (2 * half)
+    s_list, v_list = [s0], [v0]
+    drop = float(where.braking.min()) * TIME_STEP
+    while wanted or v_list[-1] > 0:
+        v = wanted.pop(0) if wanted else max(v_list[-1] - drop, 0.0)  # behind the cycle: a full brake
+        beyond = s_list[-1] + v * TIME_STEP
+        if beyond < where.length:
+            v = min(v, float(where.speed(np.array([beyond]))[0]))
+        s_list.append(min(s_list[-1] + v * TIME_STEP, where.length))
+        v_list.append(v if s_list[-1] < where.length else 0.0)
+    return SpeedPlan(now, np.array(s_list), np.array(v_list))
+
+
+def _choices(where: Course, s: float, v: float, cycle: int) -> list[tuple[Array, Array]]:
+    """Continuations of (s, v), fastest first: one cycle at constant acceleration below the plan's speed, then
+    a full brake. Samples after the first."""
+    top = where.top_speed
+    reach = top * cycle * TIME_STEP + top**2 / (2 * where.braking.min()) + 0.1  # m, beyond cycle and brake
+    ahead = (where.s >= s - 0.1) & (where.s <= s + reach)
+    braking = float(where.braking[ahead].min())
+    forward = float(where.acceleration[ahead].min())
+    u = np.linspace(-braking, forward, _LEVELS)
+    place, speed = np.full(_LEVELS, s), np.full(_LEVELS, v)
+    places, speeds = [], []
+    longest = cycle + int(np.ceil(top / braking / TIME_STEP)) + 2
+    for i in range(longest):
+        rate = u if i < cycle else np.full(_LEVELS, -braking)
+        fresh = np.maximum(speed + rate * TIME_STEP, 0.0)
+        beyond = place + fresh * TIME_STEP
+        allowed = where.speed(beyond)  # 0 at the end of the path, so the last step is free of it
+        fresh = np.where(beyond < where.length, np.minimum(fresh, allowed), fresh)
+        place = np.minimum(place + (speed + fresh) / 2 * TIME_STEP, where.length)
+        speed = np.where(place >= where.length - _PLACE, 0.0, fresh)
+        places.append(place)
+        speeds.append(speed)
+        if i >= cycle and not speed.any():
+            break
+    s_all, v_all = np.array(places), np.array(speeds)
+    return [(s_all[:, k], v_all[:, k]) for k in range(_LEVELS - 1, -1, -1)]
+
+
+def _accepted(where: Course, sensor: Sensor, s: Array, v: Array, seen: Sequence[Obstacle]) -> bool:
+    """Whether the motion from the scan (first sample) to rest is clear of everything possible."""
+    moving = np.flatnonzero(v > 0)
+    last = int(moving[-1]) + 1 if len(moving) else 0
+    if last == 0:
+        return True
+    t: Array = TIME_STEP * np.arange(last + 1, dtype=np.float64)
+    travel = where.travelled(s[: last + 1])
+    steps = np.diff(travel)
+    if travel[-1] - travel[0] + sensor.unseen_speed * t[-1] > sensor.reach:
+        return False
+    poses = where.poses(s[: last + 1])
+    for thing in seen:
+        centres = np.asarray(thing.centre) + t[:, None] * np.asarray(thing.velocity)
+        radii = thing.radius + thing.deviation * t
+        drift = (float(np.hypot(*thing.velocity)) + thing.deviation) * TIME_STEP
+        margin = np.concatenate([steps, [0.0]]) + drift  # what may happen between two samples
+        if np.any(clearance(poses, where.outline, centres, radii) < margin):
+            return False
+    return True
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What an encounter was like, every TIME_STEP. ``gap`` (m) is the distance to the nearest obstacle there
+    was (inf without one), ``hit`` whether it closed while the robot moved, ``kept`` whether every plan passed
+    its own check, ``slowest_replan`` the longest planning time, s."""
+
+    times: Array
+    s: Array
+    v: Array
+    gap: Array
+    hit: bool
+    kept: bool
+    arrived: bool
+    slowest_replan: float
+
+
+Planner = Callable[[Course, Sensor, SpeedPlan, float, Sequence[Obstacle]], SpeedPlan]
+World = Callable[[float, Array], Sequence[Obstacle]]
+
+
+def run_encounter(where: Course, sensor: Sensor, world: World, *, planner: Planner = replan, longest: float,
+                  knows_velocity: bool = False) -> Run:
+    """Drive ``where`` among the obstacles of ``world(time, pose)`` until arrival, or for ``longest`` seconds.
+
+    ``world`` gives the true obstacles; each may move at most its deviation + |velocity|. The robot sees those
+    within reach at every scan, and with ``knows_velocity`` also their velocity; without it the whole speed
+    becomes deviation. Raises ArgumentError for a ``longest`` that is not positive.
+    """
+    if not longest > 0:
+        raise ArgumentError("longest", longest, "a time > 0 s")
+    plan, slowest, kept = at_rest(0.0), 0.0, True
+    cycle = max(round(sensor.scan_time / TIME_STEP), 1)
+    s_list, v_list, gaps, hit = [0.0], [0.0], [np.inf], False
+    pose = where.poses(np.zeros(1))
+    things = world(0.0, pose[0])
+    for i in range(int(np.ceil(longest / TIME_STEP))):
+        now = i * TIME_STEP
+        if i % cycle == 0:
+            seen = [_as_seen(o, knows_velocity) for o in things
+                    if clearance(pose, where.outline, np.array([o.centre]), np.array([o.radius]))[0] <= sensor.reach]
+            begun = time.perf_counter()
+            plan = planner(where, sensor, plan, now, seen)
+            slowest = max(slowest, time.perf_counter() - begun)
+            kept = kept and stops_in_time(where, sensor, plan, seen)
+        (s,), (v,) = plan.sampled(now + TIME_STEP, 1)
+        s_list.append(float(s))
+        v_list.append(float(v))
+        pose = where.poses(np.array([s]))
+        things = world(now + TIME_STEP, pose[0])
+        gaps.append(_gap(where, float(s), things))
+        hit = hit or (gaps[-1] <= 0 and v > 0)
+        if s >= where.length - _PLACE and v == 0:
+            break
+    times: Array = TIME_STEP * np.arange(len(s_list), dtype=np.float64)
+    return Run(times, np.array(s_list), np.array(v_list), np.array(gaps), hit, kept,
+               s_list[-1] >= where.length - 1e-3, slowest)
+
+
+def _as_seen(thing: Obstacle, knows_velocity: bool) -> Obstacle:
+    if knows_velocity:
+        return thing
+    return Obstacle(thing.centre, thing.radius, (0.0, 0.0), thing.deviation + float(np.hypot(*thing.velocity)))
+
+
+def _gap(where: Course, s: float, things: Sequence[Obstacle]) -> float:
+    if not things:
+        return float("inf")
+    poses = np.repeat(where.poses(np.array([s])), len(things), axis=0)
+    return float(clearance(poses, where.outline, np.array([o.centre for o in things]),
+                           np.array([o.radius for o in things])).min())
