@@ -2,65 +2,107 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajopt.errors import ArgumentError, InfeasibleError, MissingDependencyError
+from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
 from trajopt.robots.platform import Platform
-from trajopt.timing.compiled import compiled_profile, is_compiled
-from trajopt.timing.feasibility import require_motion
+from trajopt.timing.compiled import controllable_sets
+from trajopt.timing.engines import ENGINES, pick_engine, require_engine
+from trajopt.timing.feasibility import allowed_end, require_motion
 from trajopt.timing.grid import initial_grid, insert, split
 from trajopt.timing.linear import linear_profile
-from trajopt.timing.stages import Check, FineRows, Stages, check, fine_rows, refined, stages_of
-from trajopt.timing.toppra import toppra_profile
+from trajopt.timing.segments import segment_ceiling
+from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.terrain import Flat, Terrain
 
 Array = NDArray[np.float64]
-Engine = Callable[[Stages, float, float], Array]
-
-ENGINES: dict[str, Engine] = {"compiled": compiled_profile, "toppra": toppra_profile}
 
 REFINE_ABOVE = 1e-5  # violation of s'^2 between gridpoints, relative, that is refined away if it can; chosen
 REFINE_ROUNDS = 4  # rounds spent on that; chosen
 MOST_ROUNDS = 16  # rounds before giving up on a violation above the largest slow-down; chosen
 LARGEST_SLOWDOWN = 1.001  # of time; DESIGN: at most 0.1 %
 _KEPT = 1e-9  # relative violation that counts as none
+_TIGHTER = (0.0, 1e-4, 1e-3)  # shares taken off all limits, in turn, where slowing down does not help; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """What to scale. Ends are s'^2; ``stops`` are path parameters where the robot comes to rest."""
+
+    path: Path
+    limits: tuple[Limit, ...]
+    robot: Platform | None
+    terrain: Terrain
+    start: float
+    end: float
+    stops: Array
+    engine: str
 
 
 def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
                terrain: Terrain | None = None, start_speed: float = 0.0, end_speed: float = 0.0,
-               gridpoints: int | ArrayLike | None = None, engine: str = "auto") -> Trajectory:
+               gridpoints: int | ArrayLike | None = None, engine: str = "auto",
+               stops: ArrayLike = ()) -> Trajectory:
     """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s', m/s).
 
-    ``engine``: "toppra", "compiled" (needs numba), "auto" (compiled where numba is installed, else toppra),
-    or "linear" (one factor for the whole motion, uniform in the spline parameter; it has the end speeds
-    that the path gives it). ``gridpoints``: how many, or path parameters (m); more are added where limits are
-    broken between them. What is left is removed by slowing the whole motion, end speeds included, by at
-    most 0.1 % (``Trajectory.slowdown``).
+    ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (closed form, where only
+    s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are slower motions: "linear"
+    (thesis 004: one factor for the whole motion, uniform in the spline parameter, with the end speeds that
+    the path gives it, so start and end speed must stay 0) and "segments" (below the speed of a factor for
+    each spline segment). ``gridpoints``: how many, or path parameters (m); more are added where limits are
+    broken between them. ``stops``: path parameters (m) where the robot comes to rest on the way.
+
+    What is still broken between gridpoints is removed by slowing the whole motion, end speeds included, by
+    at most 0.1 % (``Trajectory.slowdown``). Where standing still breaks a limit (momentum over a slope that
+    is too slippery) slowing does not help; then all limits are taken 0.01 or 0.1 % tighter instead.
 
     Raises ArgumentError for bad arguments, InfeasibleError (limit and place) where no motion exists, and
     MissingDependencyError for "compiled" without numba.
     """
-    terrain = Flat() if terrain is None else terrain
-    _require_arguments(path, limits, start_speed, end_speed, engine)
-    name = ("compiled" if is_compiled() else "toppra") if engine == "auto" else engine
-    terrain.check(path)
+    job = _job(path, limits, robot, terrain, (start_speed, end_speed), engine, stops)
+    u = insert(path, initial_grid(path, gridpoints), job.stops)
+    _require_drivable(job, u)
+    if engine == "linear":
+        return _linear(job, fine_rows(path, u, job.limits, robot))
+    for tighter in _TIGHTER:
+        fine, sd2, name = _refined(job, u, tighter)
+        factor = max(1.0, float(check(fine, sd2).factor.max()))
+        slack = check(fine, sd2 / factor).slack.min(axis=0)
+        if slack.min() >= -_KEPT:
+            return _trajectory(job, fine, sd2, factor, name)
+    k = int(np.argmin(slack))
+    place = float(fine.s[int(np.argmin(check(fine, sd2 / factor).slack[:, k]))])
+    raise InfeasibleError(job.limits[k].name, place, f"it is broken by {-slack[k]:.2g} of its size, and slowing "
+                          "down does not help (rest breaks it, or nearly)")
+
+
+def start_speeds(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
+                 terrain: Terrain | None = None, end_speed: float = 0.0,
+                 gridpoints: int | ArrayLike | None = None) -> tuple[float, float]:
+    """Lowest and highest start speed (m/s) from which the end of the path can be reached within limits.
+
+    Raises as ``time_scale``.
+    """
+    job = _job(path, limits, robot, terrain, (0.0, end_speed), "auto", ())
     u = initial_grid(path, gridpoints)
-    _require_drivable(path, u, robot)
-    if name == "linear":
-        return _linear(path, tuple(limits), robot, terrain, u)
-    fine, sd2, found = _refined(path, u, limits, robot, ENGINES[name], start_speed**2, end_speed**2)
-    factor = max(1.0, float(found.factor.max()))
-    return _slowed(path, tuple(limits), robot, terrain, fine, sd2, factor, name)
+    _require_drivable(job, u)
+    _, stages = _with_edges(job, u, 0.0)
+    end = allowed_end(stages, job.end)
+    low, high = np.sqrt(controllable_sets(stages, end, end)[0])
+    return float(low), float(high)
 
 
-def _require_arguments(path: Path, limits: Sequence[Limit], start: float, end: float, engine: str) -> None:
+def _job(path: Path, limits: Sequence[Limit], robot: Platform | None, terrain: Terrain | None,
+         speeds: tuple[float, float], engine: str, stops: ArrayLike) -> _Job:
+    """The checked arguments. Raises ArgumentError."""
     if not isinstance(path, Path):
         raise ArgumentError("path", path, "a Path")
     if not len(limits):
@@ -68,76 +110,96 @@ def _require_arguments(path: Path, limits: Sequence[Limit], start: float, end: f
     names = [limit.name for limit in limits]
     if len(set(names)) < len(names):
         raise ArgumentError("limits", names, "limits with different names (pass name=...)")
-    for argument, speed in (("start_speed", start), ("end_speed", end)):
+    for argument, speed in zip(("start_speed", "end_speed"), speeds, strict=True):
         if not (np.isfinite(speed) and speed >= 0):
             raise ArgumentError(argument, speed, "a finite path speed >= 0 m/s")
-    if engine not in ("auto", "linear", *ENGINES):
-        raise ArgumentError("engine", engine, "one of auto, linear, " + ", ".join(ENGINES))
-    if engine == "compiled" and not is_compiled():
-        raise MissingDependencyError("numba", "speed", "engine='compiled'")
-    if engine == "linear" and (start or end):
-        raise ArgumentError("start_speed", (start, end), "0: linear scaling takes the path's own end speeds")
+    require_engine(engine)
+    places = np.atleast_1d(np.asarray(stops, dtype=np.float64))
+    if places.ndim != 1 or not np.all((places > 0) & (places < path.length)):
+        raise ArgumentError("stops", stops, f"path parameters between 0 and {path.length:.6g} m")
+    if engine == "linear" and (any(speeds) or len(places)):
+        raise ArgumentError("start_speed, end_speed, stops", (*speeds, *places),
+                            "0 and none: linear scaling takes the path's own speeds")
+    ground = Flat() if terrain is None else terrain
+    ground.check(path)
+    return _Job(path, tuple(limits), robot, ground, speeds[0] ** 2, speeds[1] ** 2, places, engine)
 
 
-def _require_drivable(path: Path, u: Array, robot: Platform | None) -> None:
-    """Raises InfeasibleError where the robot's wheels forbid the path's twist."""
-    twist = sample_at(path, path.parameter(u), u).twist
-    if robot is None:
+def _require_drivable(job: _Job, u: Array) -> None:
+    """Raises InfeasibleError where the path has no direction, or the robot's wheels forbid its twist."""
+    twist = sample_at(job.path, job.path.parameter(u), u).twist
+    if job.robot is None:
         return
-    slipping = twist - twist @ robot.admissible @ robot.admissible.T
+    slipping = twist - twist @ job.robot.admissible @ job.robot.admissible.T
     bad = np.abs(slipping).max(axis=1) > 1e-6 * np.abs(twist).max(axis=1)
     if bad.any():
-        place = float(path.parameter(u[bad][:1])[0])
-        raise InfeasibleError("rolling", place, f"the wheels of '{robot.name}' cannot roll along this path; "
+        place = float(job.path.parameter(u[bad][:1])[0])
+        raise InfeasibleError("rolling", place, f"the wheels of '{job.robot.name}' cannot roll along this path; "
                               "leave its heading to the direction of travel")
 
 
-def _refined(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | None, engine: Engine,
-             start: float, end: float) -> tuple[FineRows, Array, Check]:
-    """Rows, s'^2 and its check, after refining the grid where limits are broken between gridpoints."""
-    fine = fine_rows(path, u, limits, robot)
+def _stages(job: _Job, fine: FineRows, tighter: float) -> Stages:
+    """What the engine solves: rows at the ends of all intervals, stops, and the ceiling of "segments"."""
+    stages = stages_of(fine)
+    ceiling = stages.sd2_max * (1 - tighter)
+    if job.engine == "segments":
+        ceiling = np.minimum(ceiling, segment_ceiling(job.path, fine))
+    if len(job.stops):
+        near = np.abs(stages.s[:, None] - job.stops).min(axis=1)
+        ceiling = np.where(near <= 1e-9 * job.path.length, 0.0, ceiling)
+    return replace(stages, sd2_max=ceiling, c=stages.c - tighter if tighter else stages.c)
+
+
+def _with_edges(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Stages]:
+    """Rows and stages on the grid u and on the edges of the limits."""
+    fine = fine_rows(job.path, u, job.limits, job.robot)
     if fine.edges:
-        fine = refined(path, fine, insert(path, u, np.asarray(fine.edges)), limits, robot)
+        fine = refined(job.path, fine, insert(job.path, u, np.asarray(fine.edges)), job.limits, job.robot)
+    return fine, _stages(job, fine, tighter)
+
+
+def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, str]:
+    """Rows, s'^2 and engine, after refining the grid where limits are broken between gridpoints."""
+    fine, stages = _with_edges(job, u, tighter)
     for done in range(MOST_ROUNDS):
-        stages = stages_of(fine)
-        profile = engine(stages, start, end)
+        name = pick_engine(job.engine, stages)
+        profile = ENGINES[name](stages, job.start, job.end)
         require_motion(stages, profile)
         sd2 = profile[stages.kept]
         found = check(fine, sd2)
         excess = np.maximum(found.factor - 1, -found.slack.min(axis=1))
         worst = float(excess.max())
         if worst <= REFINE_ABOVE or (done >= REFINE_ROUNDS and worst <= LARGEST_SLOWDOWN - 1):
-            return fine, sd2, found
+            return fine, sd2, "segments" if job.engine == "segments" else name
         if done < MOST_ROUNDS - 1:
-            fine = refined(path, fine, split(fine.u, excess > REFINE_ABOVE, 3), limits, robot)
+            grid = split(fine.u, excess > REFINE_ABOVE, 3)
+            fine = refined(job.path, fine, grid, job.limits, job.robot)
+            stages = _stages(job, fine, tighter)
     at = int(np.argmax(excess))
-    limit = limits[int(np.argmin(found.slack[at]))].name
+    limit = job.limits[int(np.argmin(found.slack[at]))].name
     raise InfeasibleError(limit, float(fine.s[at]), "it is broken between gridpoints, however fine the grid: "
                           "it jumps here, or falls to zero too fast to be followed")
 
 
-def _slowed(path: Path, limits: tuple[Limit, ...], robot: Platform | None, terrain: Terrain, fine: FineRows,
-            sd2: Array, factor: float, engine: str) -> Trajectory:
-    """The trajectory, slowed uniformly so that every limit holds on the fine grid."""
+def _trajectory(job: _Job, fine: FineRows, sd2: Array, factor: float, engine: str) -> Trajectory:
+    """The trajectory with s'^2 divided by ``factor``, reported as its slow-down."""
     sd2 = sd2 / factor
-    slack = check(fine, sd2).slack
-    for limit, least, at in zip(limits, slack.min(axis=0), slack.argmin(axis=0), strict=True):
-        if least < -_KEPT:  # slowing does not help a limit that needs speed, or that rest breaks
-            raise InfeasibleError(limit.name, float(fine.s[at]), f"it is broken by {-least:.2g} of its size, and "
-                                  "slowing down does not help (rest breaks it, or nearly)")
-    return Trajectory(path, limits, robot, terrain, fine.u, fine.s, np.sqrt(sd2),
-                      np.diff(sd2) / (2 * np.diff(fine.s)), engine, max(1.0, float(np.sqrt(factor))))
+    return Trajectory(job.path, job.limits, job.robot, job.terrain, fine.u, fine.s, np.sqrt(sd2),
+                      np.diff(sd2) / (2 * np.diff(fine.s)), engine, float(np.sqrt(factor)))
 
 
-def _linear(path: Path, limits: tuple[Limit, ...], robot: Platform | None, terrain: Terrain,
-            u: Array) -> Trajectory:
-    fine = fine_rows(path, u, limits, robot)
-    sd2 = linear_profile(path, u)
+def _linear(job: _Job, fine: FineRows) -> Trajectory:
+    """One factor on the time of the whole motion (thesis 004, eqs. 2.34 to 2.39)."""
+    if fine.edges:
+        fine = refined(job.path, fine, insert(job.path, fine.u, np.asarray(fine.edges)), job.limits, job.robot)
+    sd2 = linear_profile(job.path, fine.u)
     found = check(fine, sd2)
     worst = float(found.factor.max())
-    if not np.isfinite(worst) or worst <= 0:
-        at = int(np.argmax(found.factor))
-        limit = limits[int(np.argmin(found.slack[at]))].name
-        raise InfeasibleError(limit, float(fine.s[at]), "no factor keeps the limits: nothing bounds the "
-                              "motion, or a limit is zero here")
-    return _slowed(path, limits, robot, terrain, fine, sd2 / worst, 1.0, "linear")
+    if np.isfinite(worst) and worst > 0:
+        sd2 = sd2 / worst
+        found = check(fine, sd2)
+        if found.slack.min() >= -_KEPT:
+            return _trajectory(job, fine, sd2, 1.0, "linear")
+    at, k = np.unravel_index(int(np.argmin(found.slack)), found.slack.shape)
+    raise InfeasibleError(job.limits[int(k)].name, float(fine.s[int(at)]), "no factor on time keeps it: rest "
+                          "breaks it, it is zero here, or nothing bounds the motion")

@@ -1,0 +1,37 @@
+"""A factor of its own for every spline segment, to follow a given profile (thesis 004, eqs. 2.40 and 2.41).
+
+The thesis scales the time of each segment so that the motion touches the limits (or the given speed profile)
+once a segment. The speed then jumps at the knots, which no robot can do. ``segment_factors`` gives the
+thesis's factors; as an engine, the scaled speeds are taken as a ceiling, and the fastest profile below it that
+keeps all limits is driven.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.paths.path import Path
+from trajopt.timing.stages import FineRows, check
+
+Array = NDArray[np.float64]
+
+
+def segment_factors(path: Path, fine: FineRows) -> Array:
+    """(K-1,): factor on the time of each segment, whose nominal time is its span of spline parameter (s).
+
+    0 where nothing bounds the motion of a segment. The thesis's duration is factors @ diff(knots).
+    """
+    worst = check(fine, path.rate(fine.u) ** 2).factor
+    first = np.searchsorted(fine.u, np.asarray(path.basis.knots[:-1]))
+    return np.asarray(np.sqrt(np.maximum.reduceat(worst, first)))
+
+
+def segment_ceiling(path: Path, fine: FineRows) -> Array:
+    """(2 N,) s'^2 at both ends of every interval when every segment runs with its own factor."""
+    factors = segment_factors(path, fine)
+    middle = (fine.u[:-1] + fine.u[1:]) / 2
+    mine = factors[np.searchsorted(np.asarray(path.basis.knots), middle) - 1]
+    with np.errstate(divide="ignore"):
+        rate2 = np.repeat(path.rate(fine.u) ** 2, 2)[1:-1]
+        return np.asarray(rate2 / np.repeat(mine, 2) ** 2)

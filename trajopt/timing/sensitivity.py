@@ -1,0 +1,52 @@
+"""What each limit costs: the time a slightly looser limit would save."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.timing.engines import ENGINES, pick_engine
+from trajopt.timing.stages import Stages, fine_rows, stages_of
+from trajopt.timing.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+
+def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, float]:
+    """Seconds saved when one limit at a time grows by ``change`` of its size (1 % by default), by name.
+
+    Speeds grow by that share, rows by that share of their scale (a wheel acceleration limit, mu g, ...).
+    Solved again on the trajectory's own grid, so differences are free of the grid's error. Raises
+    ArgumentError for a trajectory that is not time-optimal (linear, segments), or a change that is not > 0.
+    """
+    if not (np.isfinite(change) and change > 0):
+        raise ArgumentError("change", change, "a share > 0, as 0.01 for one percent")
+    if trajectory.engine not in ENGINES:
+        raise ArgumentError("trajectory.engine", trajectory.engine, "a time-optimal trajectory: " + ", ".join(ENGINES))
+    fine = fine_rows(trajectory.path, trajectory.u, trajectory.limits, trajectory.robot)
+    stages = stages_of(fine)
+    stopped = np.repeat(trajectory.sd <= 0, 2)[1:-1]
+    stopped[[0, -1]] = False
+    ends = (trajectory.sd[[0, -1]] * trajectory.slowdown) ** 2
+    base = _duration(stages, stopped, ends)
+    saved = {}
+    for k, limit in enumerate(trajectory.limits):
+        c, bounds = stages.c.copy(), stages.bounds.copy()
+        c[:, stages.row_owner == k] += change
+        bounds[k] *= (1 + change) ** 2
+        looser = replace(stages, c=c, bounds=bounds, sd2_max=bounds.min(axis=0))
+        saved[limit.name] = base - _duration(looser, stopped, ends)
+    return MappingProxyType(saved)
+
+
+def _duration(stages: Stages, stopped: NDArray[np.bool_], ends: Array) -> float:
+    stages = replace(stages, sd2_max=np.where(stopped, 0.0, stages.sd2_max))
+    # A start speed on its limit is above it by rounding; the engine allows for that.
+    profile = ENGINES[pick_engine("auto", stages)](stages, float(ends[0]), float(ends[1]))
+    sd = np.sqrt(profile[stages.kept])
+    return float(np.sum(2 * np.diff(stages.s[stages.kept]) / (sd[:-1] + sd[1:])))
