@@ -184,7 +184,43 @@ class TerminalObjective:
             terms[f"wheel {name}"] = section.wheel_gain * np.abs(folded(error, section.period))
         return terms
 
+    @cached_property
+    def _affine_errors(self) -> tuple[Array, Array]:
+        return self.affine()
+
+    @cached_property
+    def _prescribed(self) -> Any:
+        """The compiled swarm (see ``objectives.swarm``) and what it compares with; None where it does not apply."""
+        if self.actuator.is_ideal or "heading" in self.problem.spline.free or self.model.inverse.shape != (4, 3) \
+                or swarm_engine() != "numba":
+            return None
+        from trajopt.objectives import swarm
+
+        points = self.control_points(self.default[:, None])
+        rows = [self.names.index(name) if name in self.names else -1
+                for name in ("p1.x_m", "p1.y_m", "p2.x_m", "p2.y_m", "duration_s")]
+        plan = swarm.prepared(step_grid(self.basis, self.steps), self.model, self.actuator, points.x[:, 0],
+                              points.y[:, 0], points.yaw[:, 0], float(points.duration[0, 0]), np.array(rows))
+        section, goal = self.problem.objective, self.problem.goal
+        wheel_gains = np.zeros(4)
+        wheel_gains[list(goal.critical_indices)] = section.wheel_gain
+        travel = np.subtract(goal.wheels, self.problem.start.wheels)
+        return plan, swarm.Goal(np.array(goal.pose), np.array(section.pose_gains), travel, wheel_gains, section.period)
+
     def evaluate(self, candidates: Array) -> Evaluation:
+        candidates = np.asarray(candidates, dtype=np.float64)
+        if self.is_affine:
+            matrix, offset = self._affine_errors
+            section = self.problem.objective
+            cost = section.wheel_gain * np.abs(folded(candidates @ matrix.T + offset, section.period)).sum(axis=1)
+            return Evaluation(cost, np.zeros(len(candidates)))
+        if self._prescribed is not None:
+            plan, goal = self._prescribed
+            return Evaluation(plan.cost(candidates, goal), np.zeros(len(candidates)))
+        return self.evaluate_readable(candidates)
+
+    def evaluate_readable(self, candidates: Array) -> Evaluation:
+        """The same from the named terms: what compiled and affine short cuts are tested against."""
         terms = self.named_terms(self.predict(np.asarray(candidates, dtype=np.float64).T))
         cost = np.sum([np.broadcast_to(t, (1, len(candidates)))[0] for t in terms.values()], axis=0)
         return Evaluation(cost, np.zeros(len(candidates)))
