@@ -7,9 +7,11 @@ from collections.abc import Callable
 from trajopt.errors import ArgumentError
 from trajopt.robots.loc8 import loc8
 from trajopt.robots.platform import Platform
+from trajopt.robots.powerbot import powerbot
 
 ROBOTS: dict[str, Callable[[], Platform]] = {
     "loc8": loc8,
+    "powerbot": powerbot,
 }
 
 

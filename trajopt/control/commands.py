@@ -1,0 +1,196 @@
+"""Wheel speed commands of a differential drive, and what the robot did with them.
+
+Commands are linear wheel speeds (m/s) held over one sample time, as thesis 004 hands them over (section 3.5).
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.robots.platform import Platform
+from trajopt.timing.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+
+_SMALL_TURN = 1e-9  # rad in one step below which a step is straight
+_FINE = 0.01  # s between points where speeds are compared; chosen
+LOG_COLUMNS = ("t", "x", "y", "yaw", "v")
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """Speeds ``left`` and ``right`` (N,), m/s, of the wheels, each held from ``times`` (N,), s, for
+    ``sample_time``."""
+
+    times: Array
+    left: Array
+    right: Array
+    sample_time: float
+
+    @property
+    def duration(self) -> float:
+        return float(self.times[-1] + self.sample_time)
+
+
+class StudyRow(NamedTuple):
+    """One sample time: error norm of the speed (m/s, eq. 3.10) and error of the final position (m, eq. 3.11)."""
+
+    sample_time: float
+    speed_error: float
+    goal_error: float
+
+
+class Comparison(NamedTuple):
+    """What a log says of a plan, as Tables 3 to 18 of thesis 004. Norms are root mean squares (eq. 3.10)."""
+
+    speed_error: float  # m/s
+    heading_error: float  # rad
+    goal_offset: float  # m
+    time_offset: float  # s
+    distance: float  # m
+
+
+def half_track(robot: Platform) -> float:
+    """Half the distance between the wheels, m. Raises ArgumentError unless the robot has two driven wheels."""
+    if robot.holonomic or len(robot.wheels) != 2:
+        raise ArgumentError("robot", robot.name, "a differential drive: two fixed wheels, left and right")
+    return float(abs(robot.wheels[0].position[1]))
+
+
+def commands(trajectory: Trajectory, sample_time: float, *, rule: Literal["held", "mean"] = "mean") -> Commands:
+    """Wheel speeds every ``sample_time`` seconds.
+
+    "held": the speed at the start of each interval (eqs. 3.7 to 3.9, as the thesis digitises). "mean": the
+    wheel's turn over the interval divided by its length, so that the wheels end at the planned angles. The
+    last interval is stretched to whole samples and holds what is left. Raises ArgumentError for a sample time
+    that is not positive, or a robot that is no differential drive.
+    """
+    if not (np.isfinite(sample_time) and sample_time > 0):
+        raise ArgumentError("sample_time", sample_time, "a finite time > 0 s")
+    robot = _robot(trajectory)
+    half_track(robot)
+    count = max(int(np.ceil(trajectory.duration / sample_time - 1e-9)), 1)
+    edges = sample_time * np.arange(count + 1, dtype=np.float64)
+    state = trajectory.at(np.minimum(edges, trajectory.duration))
+    radius = np.array([wheel.radius for wheel in robot.wheels])
+    if rule == "held":
+        speeds = state.wheel_speeds[:-1] * radius
+    elif rule == "mean":
+        speeds = np.diff(state.wheel_angles, axis=0) * radius / sample_time
+    else:
+        raise ArgumentError("rule", rule, "held or mean")
+    return Commands(edges[:-1], speeds[:, 0], speeds[:, 1], sample_time)
+
+
+def driven(orders: Commands, robot: Platform, start: Sequence[float], times: Array) -> Array:
+    """(N, 3): poses (m, m, rad) at ``times`` (N,) s of a drive that executes the commands without slip.
+
+    Exact: wheel speeds are constant in an interval, so the robot moves on an arc.
+    """
+    width = 2 * half_track(robot)
+    pose = np.empty((len(orders.times) + 1, 3))
+    pose[0] = start
+    v, w = (orders.left + orders.right) / 2, (orders.right - orders.left) / width
+    pose[1:, 2] = start[2] + np.cumsum(w * orders.sample_time)
+    moved = _arc(pose[:-1, 2], v, w, np.full(len(v), orders.sample_time))
+    pose[1:, :2] = np.asarray(start[:2]) + np.cumsum(moved, axis=0)
+    i = np.clip(np.searchsorted(orders.times, times, side="right") - 1, 0, len(v) - 1)
+    after = np.clip(times - orders.times[i], 0.0, orders.sample_time)
+    here = np.column_stack([pose[i, :2] + _arc(pose[i, 2], v[i], w[i], after), pose[i, 2] + w[i] * after])
+    return np.asarray(here)
+
+
+def sample_time_study(trajectory: Trajectory, sample_times: Sequence[float],
+                      rule: Literal["held", "mean"] = "held") -> list[StudyRow]:
+    """Tables 1 and 2 of thesis 004 without its disturbances: what digitising alone costs."""
+    robot, rows = _robot(trajectory), []
+    start, goal = trajectory.at([0.0, trajectory.duration]).pose
+    for sample_time in sample_times:
+        orders = commands(trajectory, sample_time, rule=rule)
+        t = np.arange(0.0, trajectory.duration, _FINE)
+        i = np.clip((t / sample_time).astype(np.intp), 0, len(orders.times) - 1)
+        given = (orders.left[i] + orders.right[i]) / 2
+        error = float(np.sqrt(np.mean((given - trajectory.at(t).twist[:, 0]) ** 2)))
+        end = driven(orders, robot, start, np.array([orders.duration]))[0]
+        rows.append(StudyRow(sample_time, error, float(np.hypot(*(end - goal)[:2]))))
+    return rows
+
+
+def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
+    """Write (t, v_left, v_right), s and m/s, as CSV for a robot; ends with a row of zeros."""
+    path = FilePath(file)
+    with path.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["t", "v_left", "v_right"])
+        for t, left, right in zip(orders.times, orders.left, orders.right, strict=True):
+            writer.writerow([f"{t:.6g}", f"{left:.9g}", f"{right:.9g}"])
+        writer.writerow([f"{orders.duration:.6g}", "0", "0"])
+    return path
+
+
+def compare_log(trajectory: Trajectory, file: str | FilePath) -> Comparison:
+    """Compare a plan with the log of what the robot did: CSV with columns t, x, y, yaw, v (s, m, m, rad, m/s).
+
+    Speeds are compared at the log's times, headings at equal travelled distance share, the goal by place.
+    Raises ArgumentError for a missing column, fewer than two rows, or numbers that are not finite and rising
+    in time.
+    """
+    log = _read_log(FilePath(file))
+    t = log[:, 0]
+    inside = t <= trajectory.duration
+    planned = trajectory.at(np.minimum(t, trajectory.duration))
+    speed = np.where(inside, planned.twist[:, 0], 0.0)
+    heading = _folded(log[:, 3] - planned.pose[:, 2])
+    steps = np.hypot(np.diff(log[:, 1]), np.diff(log[:, 2]))
+    return Comparison(
+        float(np.sqrt(np.mean((log[:, 4] - speed) ** 2))), float(np.sqrt(np.mean(heading**2))),
+        float(np.hypot(*(log[-1, 1:3] - planned.pose[-1, :2]))),
+        float(t[-1] - trajectory.duration), float(steps.sum()))
+
+
+def _read_log(path: FilePath) -> Array:
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            reader = csv.DictReader(line for line in stream if not line.startswith("#"))
+            missing = [name for name in LOG_COLUMNS if name not in (reader.fieldnames or ())]
+            if missing:
+                raise ArgumentError("log", str(path), "columns " + ", ".join(LOG_COLUMNS)
+                                    + " (missing: " + ", ".join(missing) + ")")
+            rows = [[float(row[name]) for name in LOG_COLUMNS] for row in reader]
+    except FileNotFoundError:
+        raise ArgumentError("log", str(path), "an existing CSV file") from None
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ArgumentError):
+            raise
+        raise ArgumentError("log", str(error), "numbers in every column") from None
+    log = np.array(rows, dtype=np.float64).reshape(-1, len(LOG_COLUMNS))
+    if len(log) < 2 or not np.all(np.isfinite(log)) or np.any(np.diff(log[:, 0]) <= 0) or log[0, 0] < 0:
+        raise ArgumentError("log", str(path), "two or more rows of finite numbers, times rising from >= 0")
+    return log
+
+
+def _robot(trajectory: Trajectory) -> Platform:
+    if trajectory.robot is None:
+        raise ArgumentError("trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))")
+    return trajectory.robot
+
+
+def _arc(yaw: Array, v: Array, w: Array, t: Array) -> Array:
+    """(N, 2): displacement on arcs of constant speed and yaw rate."""
+    turn = w * t
+    straight = np.abs(turn) < _SMALL_TURN
+    half = turn / 2
+    chord = v * t * np.where(straight, 1.0, np.sin(half) / np.where(straight, 1.0, half))
+    return np.column_stack([chord * np.cos(yaw + half), chord * np.sin(yaw + half)])
+
+
+def _folded(angle: Array) -> Array:
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
