@@ -7,6 +7,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.errors import ArgumentError
 from trajopt.timing.feasibility import allowed_end, empty_set, require_bounded, require_start_speed
 from trajopt.timing.stages import SD2_CAP, Stages
 
@@ -47,3 +48,27 @@ def controllable_sets(stages: Stages, lowest: float, highest: float) -> Array:
     if failed >= 0:
         raise empty_set(stages, int(failed), sets)
     return sets
+
+
+def fastest_profiles(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, start: Array,
+                     end: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Fastest profiles of P paths at once, each with G gridpoints and R rows a s'' + b s'^2 <= c.
+
+    ``s`` and ``sd2_max`` (P, G), ``a``, ``b``, ``c`` (P, G, R) divided by their scale, ``start`` and ``end``
+    (P,) s'^2. Returns s'^2 (P, G), NaN for a path without a motion, and (P,) the gridpoint where that one
+    fails first, -1 for all others. ``Stages`` and ``compiled_profile`` tell the limit behind it.
+    Raises ArgumentError for shapes that do not fit.
+    """
+    from trajopt.timing import kernel
+
+    paths, points = np.shape(s)
+    for name, values, shape in (("a", a, (paths, points)), ("b", b, np.shape(a)), ("c", c, np.shape(a)),
+                                ("sd2_max", sd2_max, (paths, points)), ("start", start, (paths,)),
+                                ("end", end, (paths,))):
+        if np.shape(values)[: len(shape)] != shape:
+            raise ArgumentError(name, np.shape(values), f"shape {shape}")
+    sd2, failed = np.empty((paths, points)), np.empty(paths, dtype=np.intp)
+    s, a, b, c, sd2_max, start, end = (np.ascontiguousarray(m, dtype=np.float64)
+                                       for m in (s, a, b, c, sd2_max, start, end))
+    kernel.fastest_of_many(s, a, b, c, sd2_max, start, end, sd2, failed)
+    return sd2, failed

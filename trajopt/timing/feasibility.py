@@ -53,7 +53,7 @@ def empty_set(stages: Stages, failed: int, sets: Array) -> InfeasibleError:
 def require_start_speed(stages: Stages, start: float, sets: Array) -> None:
     """Raises InfeasibleError when the end cannot be reached from s'^2 = ``start``."""
     low, high = sets[0]
-    if low * (1 - _SAME) <= start <= high * (1 + _SAME):
+    if low - _SAME * high <= start <= high * (1 + _SAME):
         return
     place = float(stages.s[0])
     speeds = f"{np.sqrt(low):.6g} to {np.sqrt(high):.6g} m/s"

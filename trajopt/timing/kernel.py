@@ -205,7 +205,8 @@ def fastest_of_many(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, star
         failed[p] = len(sets) - 1 if end[p] > sd2_max[p, -1] * (1 + _TOUCH) else -1
         if failed[p] < 0:
             failed[p] = controllable(s[p], a[p], b[p], c[p], sd2_max[p], sets)
-        if failed[p] < 0 and not sets[0, 0] - _TOUCH <= start[p] <= sets[0, 1] * (1 + _TOUCH):
+        slack = 1e-9 * sets[0, 1]
+        if failed[p] < 0 and not sets[0, 0] - slack <= start[p] <= sets[0, 1] + slack:
             failed[p] = 0
         if failed[p] < 0:
             fastest(s[p], a[p], b[p], c[p], sets, min(max(start[p], sets[0, 0]), sets[0, 1]), sd2[p])
