@@ -48,8 +48,9 @@ class ValidationReport:
         return float(np.hypot(self.along, self.across))
 
 
-def drive_trajectory(trajectory: Trajectory, problem: Problem, *, engine: str = "pybullet",
-                     picture: bool = False) -> ValidationReport:
+def drive_trajectory(
+    trajectory: Trajectory, problem: Problem, *, engine: str = "pybullet", picture: bool = False
+) -> ValidationReport:
     """Open loop at the planned wheel speeds on flat ground, LOC8 with Mecanum rollers.
 
     Raises SimulationError when the run leaves physics.
@@ -58,12 +59,17 @@ def drive_trajectory(trajectory: Trajectory, problem: Problem, *, engine: str = 
     times = np.linspace(0.0, trajectory.duration, samples)
     state = trajectory.at(times)
     # A trajectory that ends in motion is stopped: the engine gets zero speed after the last sample.
-    command = Command(np.append(times, times[-1] + COAST),
-                      np.vstack([state.wheel_speeds, np.zeros(4)]) if np.allclose(state.wheel_speeds[-1], 0)
-                      else np.vstack([state.wheel_speeds[:-1], np.zeros((2, 4))]),
-                      _triple(state.pose[0]), _four(problem.start.wheels))
-    recording = make_engine(engine).run(loc8_mecanum(), Scene(problem.scene.friction), command,
-                                        picture=Camera() if picture else None)
+    command = Command(
+        np.append(times, times[-1] + COAST),
+        np.vstack([state.wheel_speeds, np.zeros(4)])
+        if np.allclose(state.wheel_speeds[-1], 0)
+        else np.vstack([state.wheel_speeds[:-1], np.zeros((2, 4))]),
+        _triple(state.pose[0]),
+        _four(problem.start.wheels),
+    )
+    recording = make_engine(engine).run(
+        loc8_mecanum(), Scene(problem.scene.friction), command, picture=Camera() if picture else None
+    )
     if recording.exploded:
         raise SimulationError(f"{engine}: the simulation left physics: {recording.reason}")
     return _compared(trajectory, problem, recording)
@@ -78,11 +84,18 @@ def _compared(trajectory: Trajectory, problem: Problem, recording: Recording) ->
     dx, dy = error[-1, :2]
     wheels = recording.wheel_angles[-1] - (np.asarray(problem.start.wheels) + plan.wheel_angles[-1])
     return ValidationReport(
-        recording.engine, float(np.cos(heading) * dx + np.sin(heading) * dy),
-        float(-np.sin(heading) * dx + np.cos(heading) * dy), float(error[-1, 2]), wheels,
-        float(np.sqrt(np.mean(distance**2))), float(distance.max()),
-        float(np.sum(np.hypot(*np.diff(plan.pose[:, :2], axis=0).T))), recording.real_time_factor,
-        plan.pose, recording)
+        recording.engine,
+        float(np.cos(heading) * dx + np.sin(heading) * dy),
+        float(-np.sin(heading) * dx + np.cos(heading) * dy),
+        float(error[-1, 2]),
+        wheels,
+        float(np.sqrt(np.mean(distance**2))),
+        float(distance.max()),
+        float(np.sum(np.hypot(*np.diff(plan.pose[:, :2], axis=0).T))),
+        recording.real_time_factor,
+        plan.pose,
+        recording,
+    )
 
 
 def _triple(values: Array) -> tuple[float, float, float]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
+import os
+import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -114,10 +116,20 @@ class PyBullet:
 
 
 def _bullet() -> Any:
+    """The pybullet module, loaded without the build time that it prints when first imported."""
+    if "pybullet" in sys.modules and sys.modules["pybullet"] is not None:
+        return sys.modules["pybullet"]
+    sys.stdout.flush()
+    kept, silent = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silent, 1)  # the message comes from C, past sys.stdout
     try:
         import pybullet
     except ImportError as error:
         raise MissingDependencyError("pybullet", "simulate", "the physics engine 'pybullet'") from error
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(silent)
     return pybullet
 
 
