@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from trajopt.optimize.base import FEASIBLE
+from trajopt.optimize.base import FEASIBLE, Status
 from trajopt.pipeline import Solution
 from trajopt.report.style import BLUE, GREY, ORANGE, VERMILION, new_figure
 
@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 _DECADES = 1.0  # an axis is logarithmic where its values span more decades than this, chosen
 _FLOOR = 1e-16  # smallest cost drawn on a logarithmic axis: rounding of doubles
+_WORDS = {Status.EVALUATIONS: "budget used up", Status.SECONDS: "time used up", Status.NO_EXACT: "none exact"}
 
 
 def convergence_figure(solution: Solution) -> Figure:
@@ -27,14 +28,19 @@ def convergence_figure(solution: Solution) -> Figure:
     else:
         cost, violation = figure.add_subplot(), None
     feasible = history.violation <= FEASIBLE
-    drawn = _curve(cost, solution, history.cost, feasible, search.fun)
+    timed = solution.problem.objective.kind == "duration"
+    if timed:  # where wheel angles miss, searches rank by violation, and the cost is no duration
+        drawn = _curve(cost, solution, np.where(feasible, history.cost, np.nan), feasible,
+                       search.fun if search.violation <= FEASIBLE else np.inf)
+    else:
+        drawn = _curve(cost, solution, history.cost, feasible, search.fun)
     _log_where_wide(cost, drawn)
-    cost.set_ylabel("duration (s)" if solution.problem.objective.kind == "duration" else "terminal cost (–)")
+    cost.set_ylabel("duration (s)" if timed else "terminal cost (–)")
     if violation is not None:
         drawn = _curve(violation, solution, history.violation, feasible, search.violation)
         _log_where_wide(violation, drawn)
         violation.set_ylabel("violation (–)")
-    lowest = violation or cost
+    lowest = cost if violation is None else violation
     lowest.set_xlabel("evaluations of the objective")
     counts = history.evaluations[history.evaluations > 0]
     if counts.size and search.nfev / counts[0] > 10**_DECADES:
@@ -43,10 +49,15 @@ def convergence_figure(solution: Solution) -> Figure:
     else:
         lowest.set_xlim(0, max(search.nfev, 1) * 1.08 + 1)
         lowest.xaxis.get_major_locator().set_params(integer=True)
-    cost.set_title(f"{solution.problem.title}: {search.optimizer}, {search.nfev} evaluations, "
-                   f"{search.status.name.lower().replace('_', ' ')}")
-    _legend(figure, cost)
+    cost.set_title(f"{solution.problem.title}: {search.optimizer}, {_final(solution)}{search.nfev} evaluations, "
+                   f"{_WORDS.get(search.status, search.status.name.lower())}")
+    _legend(figure)
     return figure
+
+
+def _final(solution: Solution) -> str:
+    unit = " s" if solution.problem.objective.kind == "duration" else ""
+    return f"cost {solution.cost:.3g}{unit}, " if np.isfinite(solution.cost) else ""
 
 
 def _curve(axes: Axes, solution: Solution, values: Array, feasible: NDArray[np.bool_], final: float) -> Array:
@@ -70,10 +81,10 @@ def _curve(axes: Axes, solution: Solution, values: Array, feasible: NDArray[np.b
     if np.isfinite(final):
         axes.plot([nfev], [max(final, floor)], linestyle="none", marker="D", markersize=6, color=VERMILION,
                   markeredgecolor="white", markeredgewidth=0.8, zorder=3, clip_on=False,
-                  label=f"recomputed for the report: {final:.3g}" if axes.get_subplotspec() is not None
-                  and axes.get_subplotspec().is_first_row() else None)
+                  label="recomputed for the report")
     if not drawn:
-        axes.text(0.5, 0.5, "no finite value was found", transform=axes.transAxes, ha="center", color=GREY)
+        axes.text(0.5, 0.5, "no feasible candidate with a finite value", transform=axes.transAxes,
+                  ha="center", color=GREY)
     return np.array(drawn)
 
 
@@ -100,7 +111,9 @@ def _log_where_wide(axes: Axes, values: Array) -> None:
     axes.set_ylim(10 ** (low - room), 10 ** (high + room))
 
 
-def _legend(figure: Figure, axes: Axes) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+def _legend(figure: Figure) -> None:
+    """One legend below for all panels."""
+    found = {label: handle for axes in figure.axes for handle, label in zip(*axes.get_legend_handles_labels(),
+                                                                           strict=True)}
+    if found:
+        figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=3)

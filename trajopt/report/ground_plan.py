@@ -38,7 +38,7 @@ def draw_robot(axes: Axes, robot: Platform, pose: Array, colour: str = GREY, *, 
     front, half = corners[:, 0].max(), np.ptp(corners[:, 1]) * 0.16
     nose = np.array([[front, 0.0], [front - _NOSE * np.ptp(corners[:, 0]), half],
                      [front - _NOSE * np.ptp(corners[:, 0]), -half]])
-    width, shade = (1.5, 0.9) if strong else (0.7, 0.35)
+    width, shade = (1.5, 0.9) if strong else (0.7, 0.25)
     axes.add_patch(Polygon(outline(robot, pose).tolist(), closed=True, fill=False, edgecolor=colour,
                            linewidth=width, alpha=max(shade, 0.6), label=label, **options))
     axes.add_patch(Polygon(placed(nose, pose).tolist(), closed=True, facecolor=colour, edgecolor="none",

@@ -75,7 +75,7 @@ def _draw_explored(axes: Axes, solution: Solution) -> None:
     samples = samples[:: max(1, len(samples) // _MOST_DOTS)]
     if not len(samples):
         return
-    alpha = float(np.clip(40.0 / len(samples), 0.05, 0.8))
+    alpha = float(np.clip(8.0 / np.sqrt(len(samples)), 0.06, 0.8))
     for point, colour in (("p1", PURPLE), ("p2", SKY)):
         if f"{point}.x_m" not in names:
             continue

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from trajopt.paths.samples import sample_at
-from trajopt.pipeline import Solution
+from trajopt.pipeline import MARGIN, Solution
 from trajopt.report.run_folder import binding_shares, wheel_names
 from trajopt.report.style import (
     BLACK,
@@ -31,6 +31,7 @@ from trajopt.timing.trajectory import Trajectory
 Array = NDArray[np.float64]
 
 _SAMPLES = 1200  # times at which curves are drawn, chosen: more than pixels across
+_INSIDE = (0.001, 0.5, 0.999)  # of an interval: where limits are read; not on its ends, rows jump at knots. Chosen
 _BAND = 0.16  # opacity of the bands that mark the limit which binds, chosen
 _HEADROOM = 1.12  # axes end this far beyond the limit lines, chosen
 
@@ -51,40 +52,47 @@ def profile_figure(solution: Solution, trajectory: Trajectory) -> Figure:
     _limit_lines(speed, limits.speed, "limit", both=bool(np.min(state.twist[:, :2]) < -1e-6))
     _lines(turning, times, state.twist[:, 2:], ("yaw rate",), (BLACK,), "yaw rate (rad/s)")
     _limit_lines(turning, limits.yaw_rate, "limit", both=True)
-    for i, name in enumerate(wheel_names(state.wheel_speeds.shape[1])):
-        wheels.plot(times, state.wheel_speeds[:, i], color=WHEEL_COLOURS[i % 4], linestyle=WHEEL_DASHES[i % 4],
-                    label=name)
-    wheels.set_ylabel("wheel speed (rad/s)")
-    _limit_lines(wheels, limits.wheel_speed, "limit", both=True)
-    _draw_actuator(wheels, solution)
-    _draw_use(use, trajectory, times)
+    _draw_wheels(wheels, times, state.wheel_speeds, solution)
+    _draw_use(use, trajectory)
     for axes in panels:
         _bands(axes, trajectory)
         legend_beside(axes)
     figure.align_ylabels(list(panels))
     panels[-1].set_xlabel("time (s)")
     panels[-1].set_xlim(0.0, trajectory.duration)
-    panels[0].set_title(f"{solution.problem.title}: {trajectory.duration:.2f} s ({trajectory.engine})")
+    panels[0].set_title(f"{solution.problem.title}: {trajectory.duration:.2f} s, timing: {trajectory.engine}")
     _band_legend(figure, trajectory)
     return figure
 
 
-def limit_use(trajectory: Trajectory, times: Array) -> Array:
-    """(N, L): how much of each limit is in use at times (N,), s; 1 is all of it, more is broken.
+def limit_use(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Most of each limit in use between gridpoints, and when: times (s) and shares, both (N + 2, L).
 
-    From the limits' own rows: 1 minus the relative margin, as ``Trajectory.margins`` defines it.
+    The first and last rows belong to the ends of the motion, the N between to the intervals.
+
+    A share of 1 is all of the limit, more is broken. From the limits' own rows: 1 minus the relative margin, as
+    ``Trajectory.margins`` defines it.
     """
-    s, speed, acceleration = trajectory.along(times)
-    samples = sample_at(trajectory.path, s, trajectory.path.locate(s))
-    used = np.zeros((len(times), len(trajectory.limits)))
-    for k, limit in enumerate(trajectory.limits):
-        rows = limit.rows(samples, trajectory.robot)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            used[:, k] = np.nan_to_num(speed / np.sqrt(rows.sd2_max))  # 0/0: at rest under a bound of zero
-        if rows.a.shape[1]:
-            beyond = (rows.a * acceleration[:, None] + rows.b * speed[:, None] ** 2 - rows.c) / rows.scale
-            used[:, k] = np.maximum(used[:, k], 1.0 + beyond.max(axis=1))
-    return used
+    u, sdd = trajectory.u, trajectory.sdd
+    shares = np.zeros((len(_INSIDE), len(sdd), len(trajectory.limits)))
+    times = np.empty((len(_INSIDE), len(sdd), 1))
+    for j, part in enumerate(_INSIDE):
+        here = u[:-1] + part * np.diff(u)
+        s = trajectory.path.parameter(here)
+        sd2 = np.maximum(trajectory.sd[:-1] ** 2 + 2 * sdd * (s - trajectory.s[:-1]), 0.0)
+        times[j, :, 0] = trajectory.times[:-1] + 2 * (s - trajectory.s[:-1]) / (trajectory.sd[:-1] + np.sqrt(sd2))
+        samples = sample_at(trajectory.path, s, here)
+        for k, limit in enumerate(trajectory.limits):
+            rows = limit.rows(samples, trajectory.robot)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                shares[j, :, k] = np.nan_to_num(np.sqrt(sd2 / rows.sd2_max))
+            if rows.a.shape[1]:
+                beyond = (rows.a * sdd[:, None] + rows.b * sd2[:, None] - rows.c) / rows.scale
+                shares[j, :, k] = np.maximum(shares[j, :, k], 1.0 + beyond.max(axis=1))
+    times = np.broadcast_to(times, shares.shape)
+    most = shares.argmax(axis=0)[None]
+    curves = (np.vstack([v[0, :1], np.take_along_axis(v, most, axis=0)[0], v[-1, -1:]]) for v in (times, shares))
+    return next(curves), next(curves)
 
 
 def _lines(axes: Axes, times: Array, values: Array, names: Sequence[str], colours: Sequence[str],
@@ -105,22 +113,27 @@ def _limit_lines(axes: Axes, value: float | None, label: str, *, both: bool) -> 
     axes.set_ylim(min(low, -value * _HEADROOM if both else low), max(high, value * _HEADROOM))
 
 
-def _draw_actuator(axes: Axes, solution: Solution) -> None:
-    section = solution.problem.actuator
+def _draw_wheels(axes: Axes, times: Array, speeds: Array, solution: Solution) -> None:
+    for i, name in enumerate(wheel_names(speeds.shape[1])):
+        axes.plot(times, speeds[:, i], color=WHEEL_COLOURS[i % 4], linestyle=WHEEL_DASHES[i % 4], label=name)
+    axes.set_ylabel("wheel speed (rad/s)")
+    section, limit = solution.problem.actuator, solution.problem.limits.wheel_speed
+    same = section.enabled and section.saturation == limit
+    _limit_lines(axes, limit, "limit, saturation" if same else "limit", both=True)
     if not section.enabled:
         return
     if section.dead_zone > 0:
         axes.axhspan(-section.dead_zone, section.dead_zone, color=LIGHT, alpha=0.6, linewidth=0, zorder=0.6,
-                     label="dead-zone")
-    for sign in (1, -1):
+                     label=f"dead-zone {section.dead_zone:g}")
+    for sign in () if same else (1, -1):
         axes.axhline(sign * section.saturation, color=GREEN, linestyle=":", linewidth=1.2,
                      label=f"saturation {section.saturation:g}" if sign > 0 else None)
 
 
-def _draw_use(axes: Axes, trajectory: Trajectory, times: Array) -> None:
-    used = limit_use(trajectory, times)
+def _draw_use(axes: Axes, trajectory: Trajectory) -> None:
+    times, used = limit_use(trajectory)
     for k, limit in enumerate(trajectory.limits):
-        axes.plot(times, used[:, k], color=limit_colour(limit.name, k), label=_words(limit.name), linewidth=1.2)
+        axes.plot(times[:, k], used[:, k], color=limit_colour(limit.name, k), linewidth=1.2, label=_words(limit.name))
     axes.axhline(1.0, color=GREY, linestyle="--", linewidth=1.0)
     axes.set_ylim(0.0, max(1.08, float(used.max()) * 1.05))
     axes.set_ylabel("limit in use (–)")
@@ -142,10 +155,12 @@ def band_times(trajectory: Trajectory) -> list[tuple[float, float, str]]:
 def _band_legend(figure: Figure, trajectory: Trajectory) -> None:
     order, shares = [limit.name for limit in trajectory.limits], binding_shares(trajectory)
     bands = [Patch(facecolor=limit_colour(name, order.index(name)), alpha=2 * _BAND,
-                   label=f"{_words(name)} binds ({share:.0%} of the time)") for name, share in shares.items()]
+                   label=f"{_words(name)} {share:.0%}") for name, share in shares.items()]
     if not bands:
-        bands = [Patch(facecolor="white", edgecolor=LIGHT, label="no limit binds")]
-    figure.legend(handles=bands, loc="outside lower center", ncols=3)
+        bands = [Patch(facecolor="white", edgecolor=LIGHT, label="none")]
+    kept = min(trajectory.margins().values()) >= MARGIN
+    figure.legend(handles=bands, loc="outside lower left", ncols=4, alignment="left",
+                  title=f"limit that {'binds' if kept else 'binds or is broken'}, share of the time")
 
 
 def _words(name: str) -> str:

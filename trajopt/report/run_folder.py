@@ -7,6 +7,7 @@ over time; ``timing.csv`` the exact speed profile; ``history.csv`` and ``explore
 
 from __future__ import annotations
 
+import csv
 import os
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -238,9 +239,8 @@ def _timing_table(trajectory: Trajectory) -> pd.DataFrame:
 
 def _trajectory(place: FilePath, path: Path, terminal: TerminalObjective, timing: dict[str, Any]) -> Trajectory:
     table = _read_csv(place / "timing.csv", ("u", "s_m", "s_dot_m_s", "s_ddot_m_s2"))
-    u, s, sd, sdd = (table[name].to_numpy(dtype=np.float64) for name in table.columns)
-    return Trajectory(path, terminal.problem.limits.as_limits(), terminal.robot, Flat(), u, s, sd, sdd[:-1],
-                      timing["engine"], timing["slowdown"])
+    return Trajectory(path, terminal.problem.limits.as_limits(), terminal.robot, Flat(), table["u"], table["s_m"],
+                      table["s_dot_m_s"], table["s_ddot_m_s2"][:-1], timing["engine"], timing["slowdown"])
 
 
 def _history_table(history: History) -> pd.DataFrame:
@@ -256,8 +256,7 @@ def _search(summary: dict[str, Any], place: FilePath, names: tuple[str, ...]) ->
             samples = stored["samples"]
     except (OSError, ValueError, KeyError) as error:
         raise ArgumentError(str(place / "explored.npz"), str(error), "the file that solve --out writes") from None
-    history = History(table["evaluations"].to_numpy(dtype=np.int64), table["seconds_s"].to_numpy(dtype=np.float64),
-                      table["cost"].to_numpy(dtype=np.float64), table["violation"].to_numpy(dtype=np.float64),
+    history = History(table["evaluations"].astype(np.int64), table["seconds_s"], table["cost"], table["violation"],
                       samples)
     return OptimizeResult(
         x=np.array([summary["decision"][name] for name in names], dtype=np.float64),
@@ -286,12 +285,15 @@ def _write_csv(table: pd.DataFrame, file: FilePath) -> None:
     write_text(file, table.to_csv(index=False, lineterminator="\n"))
 
 
-def _read_csv(file: FilePath, columns: tuple[str, ...]) -> pd.DataFrame:
-    """Those columns of a table, every bit of their numbers. Raises ArgumentError where the table is another."""
-    import pandas as pd
+def _read_csv(file: FilePath, columns: tuple[str, ...]) -> dict[str, Array]:
+    """Those columns of a table, every bit of their numbers; an empty field is NaN.
 
+    Raises ArgumentError where the table is another.
+    """
     try:
-        return pd.read_csv(file, float_precision="round_trip")[list(columns)]
+        with file.open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+            return {name: np.array([float(row[name] or "nan") for row in rows]) for name in columns}
     except (OSError, ValueError, KeyError) as error:
         raise ArgumentError(str(file), str(error), f"a table with columns {', '.join(columns)}") from None
 

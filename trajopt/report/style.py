@@ -40,7 +40,7 @@ _SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed
 RESOLUTION = 160  # dots an inch, chosen: sharp on a screen, 1100 pixels for a full-width figure
 WIDTH = 7.0  # inch, the text width of a report
 
-_RC: dict[str, Any] = {
+_RC: Any = {
     "figure.dpi": RESOLUTION,
     "font.family": "sans-serif",
     "font.size": 9.0,
@@ -85,7 +85,7 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 def save_figure(figure: Figure, file: FilePath) -> FilePath:
     """Write a PNG under a temporary name, then rename it. Returns ``file``."""
     part = file.with_name(f".{file.name}.part")
-    figure.savefig(part, format="png", dpi=RESOLUTION)
+    figure.savefig(part, format="png", dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
     os.replace(part, file)
     return file
 
