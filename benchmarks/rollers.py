@@ -181,7 +181,7 @@ def write(rows: Sequence[Row], folder: Path) -> None:
     lines = [
         "# Roller shapes in the simulators",
         "",
-        f"LOC8 over {DISTANCE:g} m. " + "; ".join(conditions()),
+        f"LOC8 over {DISTANCE:g} m, friction {Scene().friction:g}. " + "; ".join(conditions()),
         "",
     ]
     for title, header, body in (
