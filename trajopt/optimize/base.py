@@ -8,6 +8,7 @@ that raises or returns NaN as infeasible, and ends the search when the budget is
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -150,8 +151,10 @@ class Run:
         if len(candidates) == 0:
             self.stop(Status.EVALUATIONS)
         result = self._guarded(candidates)
-        outside = np.maximum(self.bounds[:, 0] - candidates, candidates - self.bounds[:, 1]).clip(min=0.0)
-        violation = result.violation + outside.sum(axis=1)
+        violation, low, high = result.violation, self.bounds[:, 0], self.bounds[:, 1]
+        if (candidates < low).any() or (candidates > high).any():
+            outside = np.maximum(low - candidates, candidates - high)
+            violation = violation + np.maximum(outside, 0.0).sum(axis=1)
         self._record(candidates, result.cost, violation)
         if self.budget.target is not None and self.best_violation <= FEASIBLE and self.best_cost <= self.budget.target:
             self.stop(Status.TARGET)
@@ -182,6 +185,8 @@ class Run:
                                   np.concatenate([p.violation for p in parts]))
             return self._failed(np.full(1, np.inf), np.full(1, np.inf), np.ones(1, bool),
                                 f"{type(error).__name__}: {error}")
+        if math.isfinite(cost.sum() + violation.sum()):  # then each of them is; the usual case, and quick
+            return Evaluation(cost, violation)
         bad = ~(np.isfinite(cost) & np.isfinite(violation))
         if bad.any():
             worst = cost[np.argmax(bad)]
@@ -278,6 +283,8 @@ def better(cost: float, violation: float, than_cost: float, than_violation: floa
 
 def best_index(cost: Array, violation: Array) -> int:
     """Index of the best candidate under Deb's rule."""
+    if not violation.any():  # the usual case, and quick
+        return int(cost.argmin())
     feasible = violation <= FEASIBLE
     if feasible.any():
         return int(np.argmin(np.where(feasible, cost, np.inf)))

@@ -1,12 +1,16 @@
-"""Global-best particle swarm optimisation, hand-written (thesis 000, Tables 4.2 and 4.3).
+"""Particle swarm optimisation, hand-written: the search (``ParticleSwarm``) over a swarm with ask and tell.
 
 The exact update of particle i in dimension j at iteration k, with r1, r2 uniform in [0, 1), drawn anew for
-every particle, dimension and iteration:
+every particle, dimension and iteration (all of r1 first, then all of r2, particles in rows):
 
-    v_ij <- w v_ij + c1 r1 (p_ij - x_ij) + c2 r2 (g_j - x_ij),      x_ij <- x_ij + v_ij
+    v_ij <- w_k v_ij + c1 r1 (p_ij - x_ij) + c2 r2 (l_ij - x_ij)
+    v_ij <- clip(v_ij, -V_j, V_j)                                  where a velocity limit is set
+    x_ij <- x_ij + v_ij,  then the boundary rule
 
-p_i is the particle's best position and g the swarm's, both after all particles of the iteration were
-evaluated (synchronous update). "Best" is Deb's feasibility rule. Velocities start at zero.
+p_i is the particle's best position, l_i its leader: the swarm's best ("gbest") or the best of its
+neighbours on a ring, itself included ("ring"); ties go to the lower index. Both are taken after all particles
+of the iteration were evaluated (synchronous update). "Best" is Deb's feasibility rule. Velocities start at
+zero. w_k = w, or falls linearly from ``inertia`` to ``final_inertia`` over ``horizon`` iterations.
 """
 
 from __future__ import annotations
@@ -20,19 +24,30 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import FEASIBLE, Budget, OptimizeResult, Progress, Run, Status, best_index, checked_bounds, checked_x0
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.swarm import Swarm, SwarmRules
 
 Array = NDArray[np.float64]
+
+Boundary = Literal["reset", "reflect", "absorb", "invisible", "none"]
+_LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
+_CHOICES = {"topology": ("gbest", "ring"), "boundary": ("reset", "reflect", "absorb", "invisible", "none"),
+            "start": ("uniform", "grid", "sobol")}
 
 
 @dataclass(frozen=True)
 class ParticleSwarm:
-    """gbest PSO. Defaults are the constriction PSO; ``thesis_first`` and ``thesis_enhanced`` are presets.
+    """PSO. Defaults are the constriction PSO with a global best; the functions below are presets.
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position inside 0.9
-    of the space (thesis 000, Table 5.4) and stops the particle; "none" leaves it outside, where it counts as
-    infeasible; "reflect" mirrors it back and reverses its velocity.
-    ``start``: "uniform" draws positions uniformly; "grid" lays the first two variables on a grid (Table 5.4).
+    of the space (thesis 000, Table 5.4) and stops the particle; "reflect" mirrors it back and reverses its
+    velocity in that dimension; "absorb" puts it on the border and stops it in that dimension; "invisible" lets it fly on
+    without evaluating it (Robinson and Rahmat-Samii 2004); "none" evaluates it outside, where it counts as
+    infeasible.
+    ``start``: "uniform" draws positions uniformly; "grid" lays the first two variables on a grid (Table 5.4);
+    "sobol" takes a Sobol sequence with a random shift.
+    ``velocity_limit``: largest velocity as a share of the width of the bounds; None: unlimited.
+    ``stagnation``: iterations without improvement after which the search ends; None: never.
     """
 
     name: ClassVar[str] = "pso"
@@ -43,87 +58,82 @@ class ParticleSwarm:
     inertia: float = 0.7298  # Clerc and Kennedy 2002: constriction factor for phi = 4.1
     cognitive: float = 1.49618  # 0.7298 * 2.05, the same source
     social: float = 1.49618
-    boundary: Literal["reset", "reflect", "none"] = "reflect"
-    start: Literal["uniform", "grid"] = "uniform"
+    topology: Literal["gbest", "ring"] = "gbest"
+    neighbours: int = 1  # on each side of the ring; Bratton and Kennedy 2007
+    boundary: Boundary = "reflect"  # chosen
+    start: Literal["uniform", "grid", "sobol"] = "uniform"
+    velocity_limit: float | None = None  # the constriction factor makes one unnecessary, Clerc and Kennedy 2002
+    final_inertia: float | None = None
+    horizon: int = 500  # iterations, thesis 000 Table 5.8
+    stagnation: int | None = None
 
     def __post_init__(self) -> None:
         if self.particles < 2:
             raise ArgumentError("particles", self.particles, "at least 2")
-        if self.boundary not in ("reset", "reflect", "none"):
-            raise ArgumentError("boundary", self.boundary, "reset, reflect or none")
-        if self.start not in ("uniform", "grid"):
-            raise ArgumentError("start", self.start, "uniform or grid")
+        for option, choices in _CHOICES.items():
+            if getattr(self, option) not in choices:
+                raise ArgumentError(option, getattr(self, option), "one of " + ", ".join(choices))
+        if not 1 <= self.neighbours < self.particles:
+            raise ArgumentError("neighbours", self.neighbours, "a whole number from 1 to particles - 1")
+        if self.velocity_limit is not None and not self.velocity_limit > 0:
+            raise ArgumentError("velocity_limit", self.velocity_limit, "a share of the width > 0, or None")
+        if self.horizon < 1:
+            raise ArgumentError("horizon", self.horizon, "at least 1 iteration")
+        if self.stagnation is not None and self.stagnation < 1:
+            raise ArgumentError("stagnation", self.stagnation, "at least 1 iteration, or None")
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
                  rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Search until the budget ends. ``x0`` (d,) becomes the first particle's position."""
+        """Search until the budget ends, the swarm stagnates, or it has collapsed to one point.
+
+        ``x0`` (d,) becomes the first particle's position.
+        """
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self.search(run, checked_x0(x0, box), rng))
+        return run.finish(self.name, lambda: self._search(run, self.swarm(box, rng, x0=x0)))
 
-    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
-        """The iterations; ends by the run's budget, or when the swarm has collapsed to one point."""
-        low, width = run.bounds[:, 0], run.bounds[:, 1] - run.bounds[:, 0]
-        x = self._positions(run.bounds, rng)
-        if x0 is not None:
-            x[0] = x0
-        v = np.zeros_like(x)
-        result = run.evaluate(x)
-        own, own_cost, own_violation = x.copy(), result.cost, result.violation
+    def swarm(self, bounds: ArrayLike, rng: Generator, *, x0: ArrayLike | None = None) -> Swarm:
+        """A swarm of one's own to drive: ``x = swarm.ask()``, evaluate, ``swarm.tell(cost, violation)``."""
+        box = checked_bounds(bounds)
+        return Swarm.begin(SwarmRules(
+            self.particles, self.inertia, self.cognitive, self.social, self.topology, self.neighbours, self.boundary,
+            self.start, self.velocity_limit, self.final_inertia, self.horizon), box, rng, checked_x0(x0, box))
+
+    def _search(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
+        unseen = 0  # iterations in a row without a particle inside
         while True:
+            asked = swarm.ask()
+            if self.boundary != "invisible":
+                result = run.evaluate(asked)
+                swarm.learn(result.cost, result.violation)
+            elif len(asked):
+                result, unseen = run.evaluate(asked), 0
+                swarm.tell(result.cost, result.violation)
+            else:
+                swarm.tell(np.zeros(0))
+                unseen += 1
+                if unseen >= _LOST:
+                    return Status.CONVERGED, f"all particles stayed outside the bounds for {_LOST} iterations"
             run.nit += 1
-            leader = own[best_index(own_cost, own_violation)]
-            r = rng.random((2, *x.shape))
-            v = self.inertia * v + self.cognitive * r[0] * (own - x) + self.social * r[1] * (leader - x)
-            x = x + v
-            self._keep_inside(x, v, low, width, rng)
-            if np.all(np.abs(v) <= 1e-15 * width) and np.all(np.abs(x - leader) <= 1e-15 * width):
+            if swarm.collapsed:
                 return Status.CONVERGED, "the swarm has collapsed to one point"
-            result = run.evaluate(x)
-            improved = _improved(result.cost, result.violation, own_cost, own_violation)
-            own[improved] = x[improved]
-            own_cost = np.where(improved, result.cost, own_cost)
-            own_violation = np.where(improved, result.violation, own_violation)
-
-    def _positions(self, bounds: Array, rng: Generator) -> Array:
-        low, width = bounds[:, 0], bounds[:, 1] - bounds[:, 0]
-        x = low + width * rng.random((self.particles, len(bounds)))
-        if self.start == "grid" and len(bounds) >= 2:
-            # Table 5.4 prints a row index it does not use; we read a grid of n/10 columns by 10 rows with
-            # spacings of 1/(n/10 + 1) and 1/11 of the space.
-            columns = max(1, self.particles // 10)
-            i = np.arange(self.particles)
-            x[:, 0] = low[0] + width[0] * (i // 10 % columns + 1) / (columns + 1)
-            x[:, 1] = low[1] + width[1] * (i % 10 + 1) / 11
-        return x
-
-    def _keep_inside(self, x: Array, v: Array, low: Array, width: Array, rng: Generator) -> None:
-        """Apply the boundary rule in place."""
-        outside = (x < low) | (x > low + width)
-        if self.boundary == "none" or not outside.any():
-            return
-        if self.boundary == "reflect":
-            t = np.mod((x - low) / width, 2.0)
-            x[outside] = (low + width * np.where(t > 1.0, 2.0 - t, t))[outside]
-            v[outside] *= -1.0
-            return
-        rows = outside.any(axis=1)
-        centre = low + width / 2
-        x[rows] = centre + 0.9 * (rng.random((int(rows.sum()), x.shape[1])) - 0.5) * width
-        v[rows] = 0.0
-
-
-def _improved(cost: Array, violation: Array, old_cost: Array, old_violation: Array) -> NDArray[np.bool_]:
-    """Deb's rule, elementwise."""
-    new, old = violation <= FEASIBLE, old_violation <= FEASIBLE
-    return np.where(new & old, cost < old_cost,
-                    np.where(new | old, new, (violation < old_violation)
-                             | ((violation == old_violation) & (cost < old_cost))))
+            if self.stagnation is not None and swarm.idle >= self.stagnation:
+                return Status.CONVERGED, f"no improvement in {self.stagnation} iterations"
 
 
 def constriction() -> ParticleSwarm:
     """Constriction PSO (Clerc and Kennedy 2002): the package's default and its best preset."""
     return ParticleSwarm()
+
+
+def ring() -> ParticleSwarm:
+    """Standard PSO of Bratton and Kennedy 2007: constriction, ring of two neighbours, invisible outside."""
+    return ParticleSwarm(topology="ring", boundary="invisible")
+
+
+def falling_inertia() -> ParticleSwarm:
+    """Shi and Eberhart 1998: inertia from 0.9 to 0.4, c1 = c2 = 2, velocity clamped to the space's width."""
+    return ParticleSwarm(inertia=0.9, final_inertia=0.4, cognitive=2.0, social=2.0, velocity_limit=1.0)
 
 
 def thesis_first() -> ParticleSwarm:

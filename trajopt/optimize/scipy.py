@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import Capability, Evaluation, Objective
+from trajopt.objectives.base import Capability, Evaluation, Objective, ResidualObjective
 from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
 
 Array = NDArray[np.float64]
@@ -128,6 +128,79 @@ class DifferentialEvolution:
             popsize=self.population, tol=self.tolerance, maxiter=1_000_000, polish=not constrained, **extra)
         run.nit = int(result.nit)
         return Status.CONVERGED, str(result.message)
+
+
+@dataclass(frozen=True)
+class DualAnnealing:
+    """scipy.optimize.dual_annealing with its own defaults (generalised annealing and L-BFGS-B)."""
+
+    name: ClassVar[str] = "dual-annealing"
+    needs: ClassVar[frozenset[Capability]] = frozenset()
+    stochastic: ClassVar[bool] = True
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+        """Search until the budget ends. Raises ArgumentError for a constrained objective."""
+        if objective.constrained:
+            raise ArgumentError("optimizer", self.name, "a method that handles constraints for this objective: "
+                                "pso, differential-evolution, slsqp or trust-constr")
+        box = checked_bounds(bounds, objective.dimension)
+        run = Run(objective, box, budget, progress)
+        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
+
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        from scipy import optimize
+
+        result = optimize.dual_annealing(_Point(run).cost, optimize.Bounds(*run.bounds.T), x0=x0, rng=rng,
+                                         maxiter=1_000_000, maxfun=1_000_000_000)
+        run.nit = int(result.nit)
+        return Status.CONVERGED, str(result.message[0])
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """scipy.optimize.least_squares (trust-region reflective) on the gain-weighted residuals, whole turns fixed.
+
+    Starts from x0 or the middle, then from random points; ``starts`` in all. Derivatives are SciPy's finite
+    differences, counted as evaluations.
+    """
+
+    name: ClassVar[str] = "least-squares"
+    needs: ClassVar[frozenset[Capability]] = frozenset({Capability.RESIDUALS})
+    stochastic: ClassVar[bool] = True
+
+    starts: int = 20  # chosen
+    tolerance: float = 1e-15  # SciPy's xtol, ftol and gtol; tight, because budgets end searches
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+        """Search from each start in turn."""
+        box = checked_bounds(bounds, objective.dimension)
+        run = Run(objective, box, budget, progress)
+        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
+
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        from scipy import optimize
+
+        objective = cast(ResidualObjective, run.objective)
+        gains, (low, high) = objective.residual_gains(), run.bounds.T
+        for index in range(self.starts):
+            start = rng.uniform(low, high) if index else (low + high) / 2 if x0 is None else x0
+            run.evaluate(start[None])
+            turns = objective.nearest_turns(start[None])[0]
+
+            def weighted(x: Array, turns: Array = turns) -> Array:
+                run.spend(1)
+                return gains * np.array([float(np.squeeze(v)) for v in objective.residuals(x[:, None], turns)])
+
+            # SciPy asks for a start strictly inside.
+            inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
+            result = optimize.least_squares(weighted, inside, bounds=(low, high), x_scale=high - low,
+                                            xtol=self.tolerance, ftol=self.tolerance, gtol=self.tolerance)
+            run.nit += int(result.njev)
+            run.evaluate(np.clip(result.x, low, high)[None])
+            run.propose(result.x)
+        return Status.CONVERGED, f"{self.starts} starts"
 
 
 def slsqp() -> ScipyLocal:

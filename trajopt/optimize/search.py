@@ -19,6 +19,8 @@ OPTIMIZERS: dict[str, tuple[str, str]] = {
     "pso": ("trajopt.optimize.pso", "constriction"),
     "pso-thesis-first": ("trajopt.optimize.pso", "thesis_first"),
     "pso-thesis-enhanced": ("trajopt.optimize.pso", "thesis_enhanced"),
+    "pso-ring": ("trajopt.optimize.pso", "ring"),
+    "pso-inertia": ("trajopt.optimize.pso", "falling_inertia"),
     "lattice": ("trajopt.optimize.lattice", "Lattice"),
     "ipopt": ("trajopt.optimize.ipopt", "Ipopt"),
     "slsqp": ("trajopt.optimize.scipy", "slsqp"),
@@ -26,6 +28,12 @@ OPTIMIZERS: dict[str, tuple[str, str]] = {
     "trust-constr": ("trajopt.optimize.scipy", "trust_constr"),
     "nelder-mead": ("trajopt.optimize.scipy", "nelder_mead"),
     "differential-evolution": ("trajopt.optimize.scipy", "DifferentialEvolution"),
+    "dual-annealing": ("trajopt.optimize.scipy", "DualAnnealing"),
+    "least-squares": ("trajopt.optimize.scipy", "LeastSquares"),
+    "cma-es": ("trajopt.optimize.cma_es", "CmaEs"),
+    "direct": ("trajopt.optimize.nlopt", "direct"),
+    "bobyqa": ("trajopt.optimize.nlopt", "bobyqa"),
+    "hybrid": ("trajopt.optimize.hybrid", "hybrid"),
 }
 
 

@@ -1,0 +1,103 @@
+"""DIRECT and BOBYQA of the package NLopt, behind the package's contract."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.objectives.base import Capability, Objective
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+
+Array = NDArray[np.float64]
+
+_ALGORITHMS = {"direct": "GN_ORIG_DIRECT_L", "bobyqa": "LN_BOBYQA"}
+_LARGE = 1e100  # stands for an infeasible evaluation
+_STEP = 0.1  # of the width: BOBYQA's first step, chosen
+
+
+@dataclass(frozen=True)
+class NLopt:
+    """One of NLopt's derivative-free methods, on variables scaled to [0, 1].
+
+    "direct" divides the bounds into ever smaller rectangles (Gablonsky's locally biased form) and needs no
+    start; "bobyqa" fits quadratic models (Powell 2009) from ``starts`` points: x0 or the middle, then random.
+    """
+
+    needs: ClassVar[frozenset[Capability]] = frozenset()
+
+    method: Literal["direct", "bobyqa"]
+    starts: int = 10  # chosen
+    tolerance: float = 1e-12  # bobyqa's relative tolerance on the variables; tight, because budgets end searches
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self.method
+
+    @property
+    def stochastic(self) -> bool:  # type: ignore[override]
+        return self.method == "bobyqa"
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+        """Search. Raises MissingDependencyError without NLopt, ArgumentError for a constrained objective."""
+        if objective.constrained:
+            raise ArgumentError("optimizer", self.name, "a method that handles constraints for this objective: "
+                                "pso, cma-es, differential-evolution, slsqp or trust-constr")
+        box = checked_bounds(bounds, objective.dimension)
+        run = Run(objective, box, budget, progress)
+        start, package = checked_x0(x0, box), _package()
+        return run.finish(self.name, lambda: self._search(package, run, start, rng))
+
+    def _search(self, package: Any, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        low, width = run.bounds[:, 0], run.bounds[:, 1] - run.bounds[:, 0]
+        d = len(low)
+        ended: list[Exception] = []
+
+        def cost(unit: Array, _: Array) -> float:
+            try:
+                return min(run.cost(np.clip(low + width * unit, low, low + width)), _LARGE)
+            except Exception as stop:  # the run's end: NLopt hides exceptions, so remember it
+                ended.append(stop)
+                raise package.ForcedStop() from stop
+
+        rounds = 1 if self.method == "direct" else self.starts
+        for index in range(rounds):
+            search = package.opt(getattr(package, _ALGORITHMS[self.method]), d)
+            search.set_lower_bounds(np.zeros(d))
+            search.set_upper_bounds(np.ones(d))
+            search.set_min_objective(cost)
+            if self.method == "bobyqa":  # DIRECT would stop at its first small rectangle
+                search.set_xtol_rel(self.tolerance)
+            search.set_maxeval(min(run.remaining() + 1, 10_000_000))
+            search.set_initial_step(_STEP)
+            first = np.full(d, 0.5) if x0 is None else (x0 - low) / width
+            try:
+                search.optimize(first if index == 0 else rng.random(d))
+            except (package.ForcedStop, package.RoundoffLimited, RuntimeError):
+                if ended:
+                    raise ended[0] from None
+            run.nit += 1
+        return Status.CONVERGED, f"{rounds} starts" if rounds > 1 else "no rectangle is left to divide"
+
+
+def _package() -> Any:
+    try:
+        import nlopt
+    except ImportError:
+        raise MissingDependencyError("nlopt", "optimizers", "the optimizers direct and bobyqa") from None
+    return nlopt
+
+
+def direct() -> NLopt:
+    """DIRECT-L: division of rectangles."""
+    return NLopt("direct")
+
+
+def bobyqa() -> NLopt:
+    """BOBYQA: quadratic models within bounds."""
+    return NLopt("bobyqa")

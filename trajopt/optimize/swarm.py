@@ -1,0 +1,263 @@
+"""The swarm itself, with ask and tell: the state of a particle swarm that can be saved and resumed bit by bit.
+
+``trajopt.optimize.pso`` documents the update rule and the options.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.optimize.base import FEASIBLE, best_index, better
+
+Array = NDArray[np.float64]
+
+_COLLAPSED = 1e-15  # of the width: spread and velocity at which a swarm has come to rest
+_ARRAYS = ("bounds", "x", "v", "own", "own_cost", "own_violation")
+
+
+@dataclass(frozen=True)
+class SwarmRules:
+    """The options of ``ParticleSwarm`` that act in each iteration; see there."""
+
+    particles: int
+    inertia: float
+    cognitive: float
+    social: float
+    topology: str
+    neighbours: int
+    boundary: str
+    start: str
+    velocity_limit: float | None
+    final_inertia: float | None
+    horizon: int
+
+
+@dataclass(eq=False)
+class Swarm:
+    """Positions ``x``, velocities ``v``, own bests; mutable by nature. ``idle``: iterations since it improved."""
+
+    rules: SwarmRules
+    bounds: Array
+    rng: Generator
+    x: Array  # (n, d): what ``ask`` hands out next
+    v: Array
+    own: Array
+    own_cost: Array
+    own_violation: Array
+    iteration: int = 0
+    idle: int = 0
+    _reached: tuple[float, float] = (np.inf, np.inf)
+
+    def __post_init__(self) -> None:
+        i = best_index(self.own_cost, self.own_violation)
+        self._reached = float(self.own_cost[i]), float(self.own_violation[i])
+        self._gains = np.array([self.rules.cognitive, self.rules.social])[:, None, None]
+        self._pulls = np.empty((2, *self.x.shape))
+
+    @classmethod
+    def begin(cls, rules: SwarmRules, bounds: Array, rng: Generator, x0: Array | None = None) -> Swarm:
+        """A new swarm; ``x0`` (d,) becomes the first particle's position."""
+        x = _positions(rules, bounds, rng)
+        if x0 is not None:
+            x[0] = x0
+        n = len(x)
+        return cls(rules, bounds, rng, x, np.zeros_like(x), x.copy(), np.full(n, np.inf), np.full(n, np.inf))
+
+    def ask(self) -> Array:
+        """(m, d): the candidates to evaluate; fewer than particles only where some are invisible."""
+        return self.x[self._seen()] if self.rules.boundary == "invisible" else self.x.copy()
+
+    def tell(self, cost: ArrayLike, violation: ArrayLike | None = None) -> None:
+        """Costs (m,) and violations (m,) of what ``ask`` gave; then all particles move.
+
+        Raises ArgumentError for other lengths. NaN counts as infeasible.
+        """
+        self.learn(*self._told(cost, violation))
+
+    def learn(self, cost: Array, violation: Array) -> None:
+        """``tell`` without its checks: costs and violations (n,) of all particles, none NaN."""
+        self._remember(cost, violation)
+        leader = best_index(self.own_cost, self.own_violation)
+        reached = self.own_cost[leader], self.own_violation[leader]
+        self.idle = 0 if better(*reached, *self._reached) else self.idle + 1
+        self._reached = float(reached[0]), float(reached[1])
+        self._move(self.own[leader] if self.rules.topology == "gbest" else self.own[self._ring_leaders()])
+        self.iteration += 1
+
+    @property
+    def best(self) -> tuple[Array, float, float]:
+        """Best candidate (d,) told so far, its cost and violation (both inf before the first ``tell``)."""
+        i = best_index(self.own_cost, self.own_violation)
+        return self.own[i].copy(), float(self.own_cost[i]), float(self.own_violation[i])
+
+    @property
+    def collapsed(self) -> bool:
+        """Whether all particles rest at one point, so that nothing can change any more."""
+        width = self.bounds[:, 1] - self.bounds[:, 0]
+        return bool(np.abs(self.v[0, 0]) <= _COLLAPSED * width[0] and np.all(np.abs(self.v) <= _COLLAPSED * width)
+                    and np.all(np.abs(self.x - self.x[0]) <= _COLLAPSED * width))
+
+    # -- saving ---------------------------------------------------------------------------------------
+
+    def save(self, path: str | Path) -> None:
+        """Write the whole state to ``path`` (*.npz), under a temporary name first; ``load`` goes on from it."""
+        target = Path(path)
+        state = json.dumps({"rules": asdict(self.rules), "iteration": self.iteration, "idle": self.idle,
+                            "rng": self.rng.bit_generator.state}, default=_plain)
+        part = target.with_name(target.name + ".part")
+        with part.open("wb") as file:
+            np.savez(file, allow_pickle=False, state=np.array(state), **{name: getattr(self, name) for name in _ARRAYS})
+        part.replace(target)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Swarm:
+        """The swarm that ``save`` wrote, with the same random numbers to come.
+
+        Raises ArgumentError for a file that is missing or no saved swarm.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                state = json.loads(str(data["state"]))
+                arrays = [data[name] for name in _ARRAYS]
+            kind = getattr(np.random, state["rng"]["bit_generator"])()
+            kind.state = _restored(state["rng"])
+            rules = SwarmRules(**state["rules"])
+        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise ArgumentError("path", str(path), f"a file written by Swarm.save ({error})") from None
+        bounds, x, v, own, cost, violation = arrays
+        return cls(rules, bounds, Generator(kind), x, v, own, cost, violation, state["iteration"], state["idle"])
+
+    # -- one iteration --------------------------------------------------------------------------------
+
+    def _seen(self) -> NDArray[np.bool_]:
+        low, high = self.bounds.T
+        return np.asarray(((self.x >= low) & (self.x <= high)).all(axis=1))
+
+    def _told(self, cost: ArrayLike, violation: ArrayLike | None) -> tuple[Array, Array]:
+        """Costs and violations (n,) of all particles; infinite for NaN and for invisible ones."""
+        cost = np.asarray(cost, dtype=np.float64)
+        violation = np.zeros(cost.shape) if violation is None else np.asarray(violation, dtype=np.float64)
+        seen = self._seen() if self.rules.boundary == "invisible" else None
+        wanted = len(self.x) if seen is None else int(seen.sum())
+        if cost.shape != (wanted,) or violation.shape != (wanted,):
+            raise ArgumentError("cost", cost.shape, f"costs and violations of the {wanted} candidates asked, ({wanted},)")
+        bad = np.isnan(cost) | np.isnan(violation)
+        if bad.any():
+            cost, violation = np.where(bad, np.inf, cost), np.where(bad, np.inf, violation)
+        if seen is None:
+            return cost, violation
+        full = np.full((2, len(self.x)), np.inf)
+        full[0, seen], full[1, seen] = cost, violation
+        return full[0], full[1]
+
+    def _remember(self, cost: Array, violation: Array) -> None:
+        """Update own bests by Deb's rule."""
+        improved = cost < self.own_cost
+        if violation.any() or self.own_violation.any():
+            new, old = violation <= FEASIBLE, self.own_violation <= FEASIBLE
+            less = (violation < self.own_violation) | ((violation == self.own_violation) & improved)
+            improved = np.where(new & old, improved, np.where(new | old, new, less))
+            self.own_violation[improved] = violation[improved]
+        rows = improved.nonzero()[0]
+        self.own[rows] = self.x[rows]
+        self.own_cost[rows] = cost[rows]
+
+    def _ring_leaders(self) -> NDArray[np.intp]:
+        """(n,): the best own position among each particle's neighbours and itself."""
+        feasible = self.own_violation <= FEASIBLE
+        order = np.lexsort((self.own_cost, np.where(feasible, 0.0, self.own_violation)))
+        rank = np.empty(len(order), dtype=np.intp)
+        rank[order] = np.arange(len(order))
+        reach = self.rules.neighbours
+        best = np.min([np.roll(rank, k) for k in range(-reach, reach + 1)], axis=0)
+        return np.asarray(order[best])
+
+    def _move(self, leader: Array) -> None:
+        rules, x, v = self.rules, self.x, self.v
+        pulls = self._pulls
+        np.subtract(self.own, x, out=pulls[0])
+        np.subtract(leader, x, out=pulls[1])
+        pulls *= self._gains
+        pulls *= self.rng.random(pulls.shape)
+        v *= self._inertia()
+        v += pulls[0]
+        v += pulls[1]
+        low, high = self.bounds.T
+        if rules.velocity_limit is not None:
+            limit = rules.velocity_limit * (high - low)
+            np.clip(v, -limit, limit, out=v)
+        x += v
+        if rules.boundary in ("reset", "reflect", "absorb"):
+            below, above = x < low, x > high
+            if below.any() or above.any():
+                _bring_back(rules.boundary, x, v, low, high, below | above, self.rng)
+
+    def _inertia(self) -> float:
+        rules = self.rules
+        if rules.final_inertia is None:
+            return rules.inertia
+        done = min(self.iteration / rules.horizon, 1.0)
+        return rules.inertia + (rules.final_inertia - rules.inertia) * done
+
+
+def _bring_back(boundary: str, x: Array, v: Array, low: Array, high: Array, outside: NDArray[np.bool_],
+                rng: Generator) -> None:
+    """Apply a boundary rule to the particles outside, in place."""
+    width = high - low
+    if boundary == "absorb":
+        np.clip(x, low, high, out=x)
+        v[outside] = 0.0
+    elif boundary == "reflect":
+        t = np.mod((x - low) / width, 2.0)
+        x[outside] = np.clip(low + width * np.where(t > 1.0, 2.0 - t, t), low, high)[outside]
+        v[outside] *= -1.0
+    else:
+        rows = outside.any(axis=1)
+        # Thesis 000, Table 5.4: anew, inside 0.9 of the space.
+        x[rows] = low + width / 2 + 0.9 * (rng.random((int(rows.sum()), x.shape[1])) - 0.5) * width
+        v[rows] = 0.0
+
+
+def _positions(rules: SwarmRules, bounds: Array, rng: Generator) -> Array:
+    """(n, d): initial positions."""
+    low, width = bounds[:, 0], bounds[:, 1] - bounds[:, 0]
+    n, d = rules.particles, len(bounds)
+    if rules.start == "sobol":
+        from scipy.stats import qmc
+
+        count = 1 << (n - 1).bit_length()  # the sequence is balanced in powers of two only
+        unit = qmc.Sobol(d, scramble=False).random(count)[:n]
+        return np.asarray(low + width * ((unit + rng.random(d)) % 1.0))
+    x = low + width * rng.random((n, d))
+    if rules.start == "grid" and d >= 2:
+        # Table 5.4 prints a row index it does not use; we read a grid of n/10 columns by 10 rows with
+        # spacings of 1/(n/10 + 1) and 1/11 of the space.
+        columns = max(1, n // 10)
+        i = np.arange(n)
+        x[:, 0] = low[0] + width[0] * (i // 10 % columns + 1) / (columns + 1)
+        x[:, 1] = low[1] + width[1] * (i % 10 + 1) / 11
+    return np.asarray(x)
+
+
+def _plain(value: object) -> object:
+    """NumPy values of a random generator's state as JSON."""
+    if isinstance(value, np.ndarray):
+        return {"dtype": str(value.dtype), "values": value.tolist()}
+    if isinstance(value, np.integer):
+        return int(value)
+    raise TypeError(f"{type(value).__name__} in the state of a random generator")
+
+
+def _restored(value: object) -> object:
+    if isinstance(value, dict):
+        if set(value) == {"dtype", "values"}:
+            return np.array(value["values"], dtype=value["dtype"])
+        return {key: _restored(entry) for key, entry in value.items()}
+    return value
