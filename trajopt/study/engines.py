@@ -75,7 +75,7 @@ def dask_local(workers: int, *, host: str = LOOPBACK, dashboard: str | None = No
     @contextmanager
     def start() -> Iterator[Executor]:
         # Memory is limited case by case; a worker that Dask ends for its memory would cost a whole chunk.
-        with (distributed.LocalCluster(
+        with (_tries_once(), distributed.LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, host=host, memory_limit=0, silence_logs=40,
                 dashboard_address=dashboard, worker_dashboard_address=dashboard and f"{host}:0") as cluster,
               distributed.Client(cluster) as client):
@@ -114,7 +114,7 @@ def dask_slurm(jobs: int, *, memory: str = "2GB", walltime: str = "01:00:00", ho
 
     @contextmanager
     def start() -> Iterator[Executor]:
-        with SLURMCluster(
+        with _tries_once(), SLURMCluster(
                 cores=1, processes=1, memory=memory, walltime=walltime, queue=queue, log_directory=directory,
                 local_directory=directory, job_script_prologue=prologue,
                 scheduler_options={"host": host, "dashboard": False},
@@ -162,6 +162,14 @@ def _width(executor: Executor) -> int:
             return found
     client: Any = getattr(executor, "_client", None)  # Dask's
     return available_processors() if client is None else max(1, sum(client.nthreads().values()))
+
+
+def _tries_once() -> AbstractContextManager[Any]:
+    """Setting for schedulers made inside: a dead worker's task comes back at once, since ``Drive`` tries again."""
+    import dask
+
+    settings: AbstractContextManager[Any] = dask.config.set({"distributed.scheduler.allowed-failures": 0})
+    return settings
 
 
 def _distributed() -> Any:
