@@ -45,6 +45,8 @@ def test_there_are_eight():
     ({"space.x": [2.0, 1.0]}, "space.x", "from < to"),
     ({"spline.free": ["p3"]}, "spline.free[0]", "'p1'"),
     ({"spline.free": ["duration"]}, "spline.free", "at least one of"),
+    ({"spline.free": ["p2", "duration"]}, "spline.free", "actuator.enabled"),
+    ({"limits": {}}, "limits", "at least one limit"),
     ({"spline.duration": 0.0}, "spline.duration", "greater than 0"),
     ({"actuator.dead_zone": 31.0}, "actuator.dead_zone", "below saturation"),
     ({"robot.name": "r2d2"}, "robot.name", "loc8"),

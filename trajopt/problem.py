@@ -216,6 +216,9 @@ class Problem(Section):
                         "motion keeps wheel speeds within limits, so no actuator saturates")
         if self.objective.kind == "duration" and "duration" in self.spline.free:
             raise broken_rule("spline.free", list(self.spline.free), "no duration: time scaling chooses it")
+        if "duration" in self.spline.free and not self.actuator.enabled:
+            raise broken_rule("spline.free", list(self.spline.free), "no duration without actuator.enabled = true: "
+                              "ideal wheels end at the same angles whatever the duration")
         if not self.limits.as_limits():
             raise broken_rule("limits", {}, "at least one limit")
         return self
