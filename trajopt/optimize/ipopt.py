@@ -8,6 +8,7 @@ result exact where the objective has residuals. The only module that imports cas
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
@@ -196,3 +197,70 @@ def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
             return [0]
 
     return Watch()
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramResult:
+    """What IPOPT found: ``x`` (n,), ``cost``, ``solved`` (to its tolerance), its own ``status`` and iterations."""
+
+    x: Array
+    cost: float
+    solved: bool
+    status: str
+    iterations: int
+
+
+def variables(count: int) -> Any:
+    """A column of ``count`` symbols; slices and arithmetic give expressions."""
+    import casadi as ca
+
+    return ca.MX.sym("x", count)
+
+
+def stacked(parts: Sequence[Any]) -> Any:
+    """One column of expressions."""
+    import casadi as ca
+
+    return ca.vertcat(*parts)
+
+
+def matrix(values: Array) -> Any:
+    """A matrix of numbers that multiplies expressions; zeros are left out."""
+    import casadi as ca
+
+    return ca.sparsify(ca.DM(values))
+
+
+def total(column: Any) -> Any:
+    """Sum of a column of expressions."""
+    import casadi as ca
+
+    return ca.sum1(column)
+
+
+def smooth_table(grid: Array, values: Array) -> Callable[[Any], Any]:
+    """Cubic B-spline through ``values`` (N, K) on ``grid`` (N,): expressions (1, M) -> (K, M)."""
+    import casadi as ca
+
+    table = ca.interpolant("table", "bspline", [grid.tolist()], np.ascontiguousarray(values).ravel().tolist())
+    return lambda at: table.map(at.shape[1])(at)
+
+
+def solve_program(x: Any, cost: Any, constraints: Any, *, start: Array, lower: Array, upper: Array,
+                  constraint_lower: Array, constraint_upper: Array, tolerance: float = 1e-8,
+                  max_iterations: int = 300) -> ProgramResult:
+    """Minimise ``cost`` over the symbols ``x`` (n,) between bounds, with constraints between theirs, by IPOPT.
+
+    Expressions come from ``variables``, ``stacked`` and ``smooth_table``. Warm start: ``start`` (n,).
+    """
+    import casadi as ca
+
+    settings: dict[str, Any] = {
+        "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": tolerance,
+        "ipopt.max_iter": max_iterations, "ipopt.mu_strategy": "adaptive", "error_on_fail": False,
+    }
+    solver = ca.nlpsol("program", "ipopt", {"x": x, "f": cost, "g": constraints}, settings)
+    found = solver(x0=start, lbx=lower, ubx=upper, lbg=constraint_lower, ubg=constraint_upper)
+    stats = solver.stats()
+    return ProgramResult(np.asarray(found["x"], dtype=np.float64).ravel(), float(found["f"]),
+                         bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"]))
