@@ -23,7 +23,7 @@ from trajopt.optimize.base import Budget, OptimizeResult
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import OPTIMIZERS, minimize, optimizer_named
-from trajopt.problem import Problem, load_problem
+from trajopt.problem import Problem, load_problem, problem_kind
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,8 @@ QUICK = Effort(Budget(evaluations=2_000, seconds=2.0), 3, 5)
 
 def problems() -> list[Problem]:
     """The eight problem files, in the order of their names."""
-    return [load_problem(path) for path in sorted((PROBLEMS / "smdw").glob("*.toml"))]
+    files = sorted((PROBLEMS / "smdw").glob("*.toml"))
+    return [load_problem(path) for path in files if problem_kind(path) == "search"]
 
 
 def short(problem: Problem) -> str:

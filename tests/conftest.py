@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from trajopt.problem import Problem, load_problem
+from trajopt.problem import Problem, load_problem, problem_kind
 
 ROOT = Path(__file__).parent.parent
-SMDW = sorted(path.stem for path in (ROOT / "problems/smdw").glob("*.toml") if "step_" not in path.stem)
+SMDW = sorted(path.stem for path in (ROOT / "problems/smdw").glob("*.toml") if problem_kind(path) == "search")
 
 
 def smdw_problem(name: str) -> Problem:

@@ -17,8 +17,10 @@ if TYPE_CHECKING:
         SimulationError,
         TrajoptError,
     )
+    from trajopt.maneuver_problem import load_maneuver
     from trajopt.optimize.base import Budget, OptimizeResult, Status
     from trajopt.optimize.search import minimize
+    from trajopt.path_problem import load_path_problem
     from trajopt.paths.path import Path
     from trajopt.pipeline import Solution, solve, validate
     from trajopt.problem import Problem, load_problem
@@ -48,6 +50,8 @@ _HOME = {
     "Trajectory": "trajopt.timing.trajectory",
     "TrajoptError": "trajopt.errors",
     "ValidationReport": "trajopt.simulate.check",
+    "load_maneuver": "trajopt.maneuver_problem",
+    "load_path_problem": "trajopt.path_problem",
     "load_problem": "trajopt.problem",
     "minimize": "trajopt.optimize.search",
     "solve": "trajopt.pipeline",
@@ -73,6 +77,8 @@ __all__ = [
     "Trajectory",
     "TrajoptError",
     "ValidationReport",
+    "load_maneuver",
+    "load_path_problem",
     "load_problem",
     "minimize",
     "solve",

@@ -6,16 +6,15 @@ spline runs one unit of its parameter a segment, as the thesis's initial traject
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from trajopt.errors import ProblemError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.limit import Limit
 from trajopt.limits.slip import Slip
@@ -28,7 +27,7 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
-from trajopt.problem import NonNegative, Positive, Section, broken_rule, translated
+from trajopt.problem import NonNegative, Positive, Section, broken_rule, read_tables, validated
 from trajopt.robots.platform import Platform
 from trajopt.robots.powerbot import LARGEST_GRADE, powerbot
 from trajopt.world.ramp import Ramp, Ramps, lay_over
@@ -226,14 +225,10 @@ class PathProblem(Section):
                 data[name].update(value)
             else:
                 data[name] = value
-        return path_problem_from(data, self.source)
+        return validated(PathProblem, data, self.source)
 
 
-def path_problem_from(data: dict[str, Any], file: str) -> PathProblem:
-    """The problem in a file's data. Raises ProblemError in one line."""
-    if "source" in data:
-        raise ProblemError(file, "source", data["source"], "no such key: it is set by the loader")
-    try:
-        return PathProblem.model_validate_json(json.dumps({**data, "source": file}, default=str), strict=True)
-    except ValidationError as error:
-        raise translated(error, file, PathProblem) from None
+def load_path_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = None) -> PathProblem:
+    """Path problem from a TOML file; ``overrides`` maps dotted keys to values. Raises ProblemError in one line."""
+    return validated(PathProblem, read_tables(path, overrides), str(path))
+

@@ -13,7 +13,7 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 from types import UnionType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Self, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -28,14 +28,11 @@ from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 
-if TYPE_CHECKING:
-    from trajopt.maneuver_problem import ManeuverProblem
-    from trajopt.path_problem import PathProblem
-
 WheelName = Literal["front-left", "front-right", "rear-left", "rear-right"]
 WHEELS: tuple[WheelName, ...] = ("front-left", "front-right", "rear-left", "rear-right")
 FreeVariable = Literal["p1", "p2", "heading", "duration"]
 
+Model = TypeVar("Model", bound=BaseModel)
 Pose = tuple[float, float, float]
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -237,7 +234,7 @@ class Problem(Section):
                 data[name].update(value)
             else:
                 data[name] = value
-        return _validated(data, self.source)
+        return validated(Problem, data, self.source)
 
 
 def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
@@ -245,38 +242,43 @@ def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
     return PydanticCustomError("trajopt_rule", "{expected}", {"key": key, "given": value, "expected": expected})
 
 
-def load_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = None
-                 ) -> Problem | PathProblem | ManeuverProblem:
+def load_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = None) -> Problem:
     """Problem from a TOML file; ``overrides`` maps dotted keys to values.
 
-    A file with a table [path] gives its path instead of asking for a search: a PathProblem. One with a table
-    [obstacle] leaves the goal to the manoeuvre planner: a ManeuverProblem.
-
-    Raises ProblemError, in one line: file, key, value, and what would be right.
+    Raises ProblemError, in one line: file, key, value, and what would be right. Files with a table [path] or
+    [obstacle] are of other kinds (``problem_kind``) and have loaders of their own.
     """
-    data = _tables(path)
-    for key, value in (overrides or {}).items():
-        set_key(data, key.split("."), value, str(path))
-    if "path" in data:
-        from trajopt.path_problem import path_problem_from  # it builds on this module
-
-        return path_problem_from(data, str(path))
-    if "obstacle" in data:
-        from trajopt.maneuver_problem import maneuver_from  # so does this
-
-        return maneuver_from(data, str(path))
-    return _validated(data, str(path))
+    data = read_tables(path, overrides)
+    for kind, loader in OTHER_KINDS.items():
+        if kind in data:
+            expected = f"no such table in this kind of problem; read the file with {loader}"
+            raise ProblemError(str(path), kind, "a table", expected)
+    return validated(Problem, data, str(path))
 
 
-def _tables(path: str | FilePath) -> dict[str, Any]:
+# table that marks another kind of problem file -> the function that reads it
+OTHER_KINDS = {"path": "trajopt.load_path_problem", "obstacle": "trajopt.load_maneuver"}
+
+
+def problem_kind(path: str | FilePath) -> str:
+    """What a problem file asks for: "search" (control points), "path" (timing) or "obstacle" (a manoeuvre)."""
+    tables = read_tables(path)
+    return next((kind for kind in OTHER_KINDS if kind in tables), "search")
+
+
+def read_tables(path: str | FilePath, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Tables of a TOML file with ``overrides`` (dotted keys) applied. Raises ProblemError."""
     try:
-        return tomllib.loads(FilePath(path).read_text(encoding="utf-8"))
+        data = tomllib.loads(FilePath(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ProblemError(str(path), "file", "missing", "an existing problem file (*.toml)") from None
     except IsADirectoryError:
         raise ProblemError(str(path), "file", "a directory", "a problem file (*.toml)") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ProblemError(str(path), "file", str(error), "valid TOML in UTF-8") from None
+    for key, value in (overrides or {}).items():
+        set_key(data, key.split("."), value, str(path))
+    return data
 
 
 def problem_schema() -> str:
@@ -288,22 +290,24 @@ def problem_schema() -> str:
 
 def set_key(data: dict[str, Any], keys: list[str], value: Any, file: str) -> None:
     """Set a nested key, making tables on the way; unknown names are left to validation."""
+    table: Any = data
     for depth, key in enumerate(keys[:-1]):
-        data = data.setdefault(key, {})
-        if not isinstance(data, dict):
+        table = table.setdefault(key, {})
+        if not isinstance(table, dict):
             none = ".".join(keys[: depth + 1])
             raise ProblemError(file, ".".join(keys), value, f"a key below a table ({none} is none)")
-    data[keys[-1]] = value
+    table[keys[-1]] = value
 
 
-def _validated(data: dict[str, Any], file: str) -> Problem:
+def validated(model: type[Model], data: dict[str, Any], file: str) -> Model:
+    """``data`` as a model with its ``source`` set. Raises ProblemError in one line."""
     if "source" in data:
         raise ProblemError(file, "source", data["source"], "no such key: it is set by the loader")
     try:
         # Through JSON, because only there does strict mode take arrays for tuples.
-        return Problem.model_validate_json(json.dumps({**data, "source": file}, default=str), strict=True)
+        return model.model_validate_json(json.dumps({**data, "source": file}, default=str), strict=True)
     except ValidationError as error:
-        raise translated(error, file, Problem) from None
+        raise translated(error, file, model) from None
 
 
 def translated(error: ValidationError, file: str, model: type[BaseModel]) -> ProblemError:
