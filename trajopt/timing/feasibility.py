@@ -20,7 +20,9 @@ def allowed_end(stages: Stages, end: float) -> float:
     """
     allowed = stages.sd2_max[-1]
     if end > allowed * (1 + _SAME):
-        limit = stages.names[int(np.argmin(stages.bounds[:, -1]))]
+        bounds = stages.bounds[:, -1]
+        # A ceiling below all limits is the one that scaling by segments sets.
+        limit = stages.names[int(np.argmin(bounds))] if bounds.min() <= allowed * (1 + _SAME) else "segments"
         raise InfeasibleError(limit, float(stages.s[-1]),
                               f"the end speed {np.sqrt(end):.6g} m/s exceeds {np.sqrt(allowed):.6g} m/s")
     return float(min(end, allowed))

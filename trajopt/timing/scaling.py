@@ -73,15 +73,14 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
     if engine == "linear":
         return _linear(job, fine_rows(path, u, job.limits, robot))
     for tighter in _TIGHTER:
-        fine, sd2, name = _refined(job, u, tighter)
-        factor = max(1.0, float(check(fine, sd2).factor.max()))
-        slack = check(fine, sd2 / factor).slack.min(axis=0)
+        fine, sd2, worst, name = _refined(job, u, tighter)
+        factor = max(1.0, worst)
+        slack = check(fine, sd2 / factor).slack
         if slack.min() >= -_KEPT:
             return _trajectory(job, fine, sd2, factor, name)
-    k = int(np.argmin(slack))
-    place = float(fine.s[int(np.argmin(check(fine, sd2 / factor).slack[:, k]))])
-    raise InfeasibleError(job.limits[k].name, place, f"it is broken by {-slack[k]:.2g} of its size, and slowing "
-                          "down does not help (rest breaks it, or nearly)")
+    at, k = np.unravel_index(int(np.argmin(slack)), slack.shape)
+    raise InfeasibleError(job.limits[int(k)].name, float(fine.s[int(at)]), f"it is broken by {-slack.min():.2g} of "
+                          "its size, and slowing down does not help (rest breaks it, or nearly)")
 
 
 def start_speeds(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
@@ -158,8 +157,8 @@ def _with_edges(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Stages]:
     return fine, _stages(job, fine, tighter)
 
 
-def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, str]:
-    """Rows, s'^2 and engine, after refining the grid where limits are broken between gridpoints."""
+def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, float, str]:
+    """Rows, s'^2, the factor on it that is left, and engine, on a grid refined where limits are broken."""
     fine, stages = _with_edges(job, u, tighter)
     for done in range(MOST_ROUNDS):
         name = pick_engine(job.engine, stages)
@@ -170,7 +169,7 @@ def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, str]
         excess = np.maximum(found.factor - 1, -found.slack.min(axis=1))
         worst = float(excess.max())
         if worst <= REFINE_ABOVE or (done >= REFINE_ROUNDS and worst <= LARGEST_SLOWDOWN - 1):
-            return fine, sd2, "segments" if job.engine == "segments" else name
+            return fine, sd2, float(found.factor.max()), "segments" if job.engine == "segments" else name
         if done < MOST_ROUNDS - 1:
             grid = split(fine.u, excess > REFINE_ABOVE, 3)
             fine = refined(job.path, fine, grid, job.limits, job.robot)
