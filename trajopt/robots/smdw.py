@@ -197,11 +197,10 @@ def forward_alphas(wheel: DoubleWheel, height: float, *, theta: float | None = N
 
     At wheel angle ``theta`` (Figure 4.18 takes 0), or at any if None.
     """
-    alphas = np.radians(np.arange(0.0, 90.01, 0.1))
-    angles = _SCAN if theta is None else np.array([theta])
+    alphas = np.radians(np.arange(0.0, math.degrees(LARGEST_FORWARD_ALPHA) + 0.01, 0.2))
+    angles = _SCAN[::4] if theta is None else np.array([theta])
     found = meet_step(wheel, angles[:, None], -alphas[None, :], height)
     good = (found.over & (found.clearance >= height) & (found.tangent > -STEEPEST_TANGENT)).any(axis=0)
-    good &= alphas <= LARGEST_FORWARD_ALPHA + 1e-9
     good &= height < wheel.greatest_clearance
     return (float(alphas[good].min()), float(alphas[good].max())) if good.any() else None
 
