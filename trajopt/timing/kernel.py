@@ -191,6 +191,59 @@ def fastest(s: Array, a: Array, b: Array, c: Array, sets: Array, start: float, s
 
 
 @_compiled
+def bounds_of_intervals(s: Array, a: Array, c: Array, lowest: Array, highest: Array) -> bool:
+    """Fills lowest and highest (G-1,), the bounds on u in each interval, from rows a u <= c without x.
+
+    False when u is not bounded on both sides everywhere, or a flat row is broken: then this pass is no use.
+    """
+    low_before, high_before = -np.inf, np.inf
+    for i in range(len(s)):
+        low, high = -np.inf, np.inf
+        for r in range(a.shape[1]):
+            if a[i, r] > _FLAT:
+                high = min(high, c[i, r] / a[i, r])
+            elif a[i, r] < -_FLAT:
+                low = max(low, c[i, r] / a[i, r])
+            elif c[i, r] < 0:
+                return False
+        if np.isinf(low) or np.isinf(high):
+            return False
+        if i > 0:
+            lowest[i - 1], highest[i - 1] = max(low_before, low), min(high_before, high)
+        low_before, high_before = low, high
+    return True
+
+
+@_compiled
+def controllable_in_bounds(s: Array, lowest: Array, highest: Array, sd2_max: Array, sets: Array) -> int:
+    """Backward pass of ``controllable`` where u has bounds of its own: two lines a gridpoint."""
+    for i in range(len(s) - 2, -1, -1):
+        grow = 2 * (s[i + 1] - s[i])
+        low, high = sets[i + 1, 0], min(sets[i + 1, 1], min(sd2_max[i], SD2_CAP))
+        if grow > 0:
+            if lowest[i] > highest[i]:
+                return i
+            high = min(sets[i + 1, 1] - grow * lowest[i], min(sd2_max[i], SD2_CAP))
+            low = max(low - grow * highest[i], 0.0)
+        if low > high:
+            if low > high + _TOUCH * abs(low):
+                return i
+            low = high
+        sets[i, 0], sets[i, 1] = low, high
+    return -1
+
+
+@_compiled
+def fastest_in_bounds(s: Array, highest: Array, sets: Array, start: float, sd2: Array) -> None:
+    """Forward pass of ``fastest`` where u has bounds of its own."""
+    sd2[0] = start
+    for i in range(len(s) - 1):
+        grow = 2 * (s[i + 1] - s[i])
+        x = sd2[i] + (grow * highest[i] if grow > 0 else 0.0)
+        sd2[i + 1] = min(max(x, sets[i + 1, 0]), sets[i + 1, 1])
+
+
+@_compiled
 def fastest_of_many(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, start: Array, end: Array,
                     sd2: Array, failed: NDArray[np.intp]) -> None:
     """Both passes for P paths: s, sd2_max, sd2 (P, G), a, b, c (P, G, R), start, end, failed (P,).

@@ -53,7 +53,7 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
                stops: ArrayLike = ()) -> Trajectory:
     """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s', m/s).
 
-    ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (closed form, where only
+    ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast pass, where only
     s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are slower motions: "linear"
     (thesis 004: one factor for the whole motion, uniform in the spline parameter, with the end speeds that
     the path gives it, so start and end speed must stay 0) and "segments" (below the speed of a factor for
