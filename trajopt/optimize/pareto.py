@@ -1,4 +1,4 @@
-"""Pareto fronts of several terms at once, by NSGA-II of pymoo (optional extra "pareto")."""
+"""Pareto fronts of several terms at once, by NSGA-II of pymoo (optional extra "optimizers")."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def _search(terms: Terms, box: Array, count: int, seed: int, population: int, ge
         from pymoo.core.problem import Problem
         from pymoo.optimize import minimize as run
     except ImportError as error:
-        raise MissingDependencyError("pymoo", "pareto", "a Pareto front") from error
+        raise MissingDependencyError("pymoo", "optimizers", "a Pareto front") from error
 
     class Task(Problem):  # type: ignore[misc]  # pymoo asks for a subclass
         def __init__(self) -> None:
