@@ -10,7 +10,7 @@ from numpy.random import Generator
 from numpy.typing import ArrayLike
 
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, better, checked_bounds
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Status, better, checked_bounds
 from trajopt.optimize.pso import ParticleSwarm
 from trajopt.optimize.scipy import ScipyLocal
 

@@ -41,7 +41,7 @@ class ParticleSwarm:
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position inside 0.9
     of the space (thesis 000, Table 5.4) and stops the particle; "reflect" mirrors it back and reverses its
-    velocity in that dimension; "absorb" puts it on the border and stops it in that dimension; "invisible" lets it fly on
+    velocity in that dimension; "absorb" puts it on the border and stops it there; "invisible" lets it fly on
     without evaluating it (Robinson and Rahmat-Samii 2004); "none" evaluates it outside, where it counts as
     infeasible.
     ``start``: "uniform" draws positions uniformly; "grid" lays the first two variables on a grid (Table 5.4);

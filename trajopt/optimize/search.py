@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult, checked_bounds
 from trajopt.optimize.functions import as_objective
+from trajopt.optimize.plugins import installed_optimizers, optimizers_of_file
 
 # name -> module and the class or preset function that makes it with default options
 OPTIMIZERS: dict[str, tuple[str, str]] = {
@@ -37,13 +38,38 @@ OPTIMIZERS: dict[str, tuple[str, str]] = {
 }
 
 
+def optimizer_names() -> tuple[str, ...]:
+    """All optimizers: the package's own, then those of installed packages (entry points)."""
+    return (*OPTIMIZERS, *(name for name in installed_optimizers() if name not in OPTIMIZERS))
+
+
 def optimizer_named(name: str) -> Optimizer:
-    """The optimizer called ``name`` with its default options. Raises ArgumentError for an unknown name."""
-    if name not in OPTIMIZERS:
-        raise ArgumentError("optimizer", name, "auto or one of " + ", ".join(OPTIMIZERS))
-    module, attribute = OPTIMIZERS[name]
-    made: Optimizer = getattr(importlib.import_module(module), attribute)()
-    return made
+    """The optimizer called ``name`` with its default options.
+
+    Also one of an installed package, or of a file: "file.py" or "file.py:name" (see ``optimize.plugins``).
+    Raises ArgumentError for an unknown name.
+    """
+    if name in OPTIMIZERS:
+        module, attribute = OPTIMIZERS[name]
+        return checked_optimizer(name, getattr(importlib.import_module(module), attribute)())
+    file, _, wanted = name.partition(".py:") if ".py:" in name else (name.removesuffix(".py"), "", "")
+    if file != name:
+        offered = optimizers_of_file(file + ".py")
+        wanted = wanted or next(iter(offered))
+    else:
+        offered, wanted = installed_optimizers(), name
+    if wanted not in offered:
+        known = OPTIMIZERS if file == name else {}
+        raise ArgumentError("optimizer", name, "auto or one of " + ", ".join([*known, *offered]))
+    return checked_optimizer(name, offered[wanted]())
+
+
+def checked_optimizer(name: str, made: Any) -> Optimizer:
+    """``made``, if it keeps the contract of optimizers. Raises ArgumentError naming what is missing."""
+    for attribute in ("name", "needs", "stochastic", "minimize"):
+        if not hasattr(made, attribute):
+            raise ArgumentError("optimizer", name, f"an object with the attribute '{attribute}' (optimize.base.Optimizer)")
+    return cast(Optimizer, made)
 
 
 def automatic(objective: Objective) -> str:

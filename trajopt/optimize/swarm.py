@@ -147,7 +147,7 @@ class Swarm:
         seen = self._seen() if self.rules.boundary == "invisible" else None
         wanted = len(self.x) if seen is None else int(seen.sum())
         if cost.shape != (wanted,) or violation.shape != (wanted,):
-            raise ArgumentError("cost", cost.shape, f"costs and violations of the {wanted} candidates asked, ({wanted},)")
+            raise ArgumentError("cost", cost.shape, f"shape ({wanted},): one entry a candidate asked")
         bad = np.isnan(cost) | np.isnan(violation)
         if bad.any():
             cost, violation = np.where(bad, np.inf, cost), np.where(bad, np.inf, violation)

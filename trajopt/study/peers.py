@@ -1,0 +1,114 @@
+"""PSO of other packages behind the package's contract, for the benchmark only: pyswarms and pymoo.
+
+Their random numbers: pyswarms draws from NumPy's global state, which is set from the generator given and put
+back afterwards; pymoo takes a seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import ArrayLike, NDArray
+
+from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.objectives.base import Capability, Objective
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds
+
+Array = NDArray[np.float64]
+
+_LARGE = 1e100  # stands for an infeasible evaluation
+_FOREVER = 1_000_000  # iterations; the run's budget ends searches before
+
+
+@dataclass(frozen=True)
+class PySwarms:
+    """pyswarms's GlobalBestPSO. Its documentation's options, or with ``equal`` our constriction coefficients."""
+
+    needs: ClassVar[frozenset[Capability]] = frozenset()
+    stochastic: ClassVar[bool] = True
+
+    equal: bool = False
+    particles: int = 50
+
+    @property
+    def name(self) -> str:
+        return "pyswarms"
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,  # noqa: ARG002
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+        """Search; pyswarms knows no start and no constraints (ArgumentError)."""
+        box = _only_bounds(self.name, objective, bounds)
+        run = Run(objective, box, budget, progress)
+        return run.finish(self.name, lambda: self._search(run, rng))
+
+    def _search(self, run: Run, rng: Generator) -> tuple[Status, str]:
+        try:
+            from pyswarms.single.global_best import GlobalBestPSO
+        except ImportError:
+            raise MissingDependencyError("pyswarms", "peers", "the optimizer pyswarms") from None
+        # pyswarms 1.3 documentation, "Basic Optimization"; Clerc and Kennedy 2002 for the equal ones
+        options = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298} if self.equal else {"c1": 0.5, "c2": 0.3, "w": 0.9}
+        before = np.random.get_state()  # noqa: NPY002 - the only generator pyswarms knows
+        np.random.seed(int(rng.integers(2**31)))  # noqa: NPY002
+        try:
+            swarm = GlobalBestPSO(self.particles, len(run.bounds), options, bounds=tuple(run.bounds.T))
+            swarm.optimize(lambda x: np.minimum(run.evaluate(x).cost, _LARGE), _FOREVER, verbose=False)
+        finally:
+            np.random.set_state(before)  # noqa: NPY002
+        return Status.CONVERGED, "all iterations done"
+
+
+@dataclass(frozen=True)
+class Pymoo:
+    """pymoo's PSO with its defaults (adaptive coefficients, random restarts off)."""
+
+    name: ClassVar[str] = "pymoo-pso"
+    needs: ClassVar[frozenset[Capability]] = frozenset()
+    stochastic: ClassVar[bool] = True
+
+    particles: int = 50
+
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,  # noqa: ARG002
+                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+        """Search; constraints are not passed on (ArgumentError)."""
+        box = _only_bounds(self.name, objective, bounds)
+        run = Run(objective, box, budget, progress)
+        return run.finish(self.name, lambda: self._search(run, rng))
+
+    def _search(self, run: Run, rng: Generator) -> tuple[Status, str]:
+        try:
+            from pymoo.algorithms.soo.nonconvex.pso import PSO
+            from pymoo.core.problem import Problem
+            from pymoo.optimize import minimize
+        except ImportError:
+            raise MissingDependencyError("pymoo", "peers", "the optimizer pymoo-pso") from None
+
+        class Asked(Problem):  # type: ignore[misc] - pymoo's interface is a base class
+            def _evaluate(self, x: Array, out: dict[str, Any], *_: Any, **__: Any) -> None:
+                out["F"] = np.minimum(run.evaluate(x).cost, _LARGE)[:, None]
+
+        problem = Asked(n_var=len(run.bounds), n_obj=1, xl=run.bounds[:, 0], xu=run.bounds[:, 1])
+        minimize(problem, PSO(pop_size=self.particles), ("n_gen", _FOREVER), seed=int(rng.integers(2**31)))
+        return Status.CONVERGED, "pymoo's stopping rule is met"
+
+
+def _only_bounds(name: str, objective: Objective, bounds: ArrayLike) -> Array:
+    if objective.constrained:
+        raise ArgumentError("optimizer", name, "a method that handles constraints for this objective: pso")
+    return checked_bounds(bounds, objective.dimension)
+
+
+def equal_pyswarms() -> PySwarms:
+    """pyswarms with the coefficients of our default."""
+    return PySwarms(equal=True)
+
+
+PEERS: dict[str, Callable[[], Any]] = {
+    "pyswarms": PySwarms,
+    "pyswarms-constriction": equal_pyswarms,
+    "pymoo-pso": Pymoo,
+}
