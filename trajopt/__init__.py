@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from trajopt.optimize.search import minimize
     from trajopt.path_problem import load_path_problem
     from trajopt.paths.path import Path
-    from trajopt.pipeline import Solution, solve, validate
+    from trajopt.pipeline import Solution, solve, time_path, validate
     from trajopt.problem import Problem, load_problem
     from trajopt.simulate.check import ValidationReport
     from trajopt.timing.scaling import time_scale
@@ -55,6 +55,7 @@ _HOME = {
     "load_problem": "trajopt.problem",
     "minimize": "trajopt.optimize.search",
     "solve": "trajopt.pipeline",
+    "time_path": "trajopt.pipeline",
     "time_scale": "trajopt.timing.scaling",
     "validate": "trajopt.pipeline",
 }
@@ -82,6 +83,7 @@ __all__ = [
     "load_problem",
     "minimize",
     "solve",
+    "time_path",
     "time_scale",
     "validate",
 ]

@@ -14,6 +14,7 @@ from trajopt.objectives.duration import DurationObjective
 from trajopt.objectives.terminal import TerminalObjective, folded, terminal_objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult
 from trajopt.optimize.search import minimize
+from trajopt.path_problem import PathProblem
 from trajopt.paths.path import Path
 from trajopt.problem import Problem
 from trajopt.robots.actuator import Actuator
@@ -123,6 +124,15 @@ def solve(problem: Problem, *, optimizer: str | Optimizer = "auto", seed: int = 
     deviation, wheels = _final_deviation(terminal, found.x, trajectory)
     return Solution(problem, objective, found, objective.terms(found.x), path, trajectory, infeasible, deviation,
                     wheels, _dead_zone_effect(problem, trajectory), time.perf_counter() - started)
+
+
+def time_path(problem: PathProblem, *, engine: str = "auto") -> Trajectory:
+    """The fastest motion along a given path, thesis 004's kind of problem.
+
+    Raises InfeasibleError, naming limit and place, where no motion keeps the limits.
+    """
+    return time_scale(problem.spline, problem.as_limits(), robot=problem.platform, terrain=problem.terrain,
+                      engine=engine)
 
 
 def validate(trajectory: Trajectory, problem: Problem, *, engine: str = "pybullet",

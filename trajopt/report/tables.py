@@ -73,7 +73,7 @@ def _margin_rows(table: Table, solution: Solution) -> None:
     shares = binding_shares(solution.trajectory)
     for name, margin in sorted(solution.margins.items(), key=lambda item: item[1]):
         binds = f", binds {shares[name]:.0%} of the time" if name in shares else ""
-        text = f"{margin:.1%}{binds}" if margin > -1e-9 else f"[red]broken by {-margin:.1%}[/red]"
+        text = f"{max(margin, 0.0):.1%}{binds}" if margin > -1e-9 else f"[red]broken by {-margin:.1%}[/red]"
         table.add_row(f"margin {escape(name)}", text)
 
 

@@ -1,38 +1,23 @@
-"""The command line: ``trajopt solve | validate | schema`` and the commands of the other rooms.
-
-Exit codes: 0 for a result that holds, 1 for one that does not, 2 for input that cannot be used.
-"""
+"""``trajopt solve | validate | schema``: search control points, time the path, check it in physics."""
 
 from __future__ import annotations
 
 import sys
-import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from trajopt.errors import ArgumentError, TrajoptError
+from trajopt.cli.shared import FAULTY, Bar, Overrides, ProblemFile, console, overrides
+from trajopt.errors import ArgumentError
 
 if TYPE_CHECKING:
     from trajopt.optimize.base import Budget
     from trajopt.pipeline import Solution
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
-                  help="Plan, time and check motions of wheeled ground robots.")
-console = Console()
-
-HOLDS, FAULTY, UNUSABLE = 0, 1, 2
-
-ProblemFile = Annotated[Path, typer.Argument(help="problem file (*.toml)", show_default=False)]
-Overrides = Annotated[list[str] | None, typer.Option(
-    "--set", help="change a key of the problem, e.g. --set goal.wheels=[0,0,0,0]", show_default=False)]
 Out = Annotated[Path | None, typer.Option("--out", help="folder for trajectory, summary and pictures")]
 
 
-@app.command()
 def solve(problem: ProblemFile,
           optimizer: Annotated[str, typer.Option(help="auto or the name of an optimizer")] = "auto",
           seed: Annotated[int, typer.Option(help="seed of everything random")] = 0,
@@ -48,14 +33,14 @@ def solve(problem: ProblemFile,
     from trajopt.problem import load_problem
     from trajopt.report.tables import solution_table
 
-    loaded = load_problem(problem, _overrides(set_))
+    loaded = load_problem(problem, overrides(set_))
     budget = _budget(evaluations, seconds, target)
     start = None
     if x0 is not None:
         from trajopt.report.run_folder import read_solution
 
         start = read_solution(x0).search.x
-    with _Bar(f"{optimizer}", budget.evaluations) as bar:
+    with Bar(f"{optimizer}", budget.evaluations) as bar:
         solution = solve_problem(loaded, optimizer=optimizer, seed=seed, budget=budget, x0=start, progress=bar.update)
     console.print(solution_table(solution))
     if out is not None:
@@ -66,7 +51,6 @@ def solve(problem: ProblemFile,
         raise typer.Exit(FAULTY)
 
 
-@app.command()
 def validate(folder: Annotated[Path, typer.Argument(help="folder written by solve --out")],
              engine: Annotated[str, typer.Option(help="pybullet or mujoco")] = "pybullet",
              pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True) -> None:
@@ -79,7 +63,7 @@ def validate(folder: Annotated[Path, typer.Argument(help="folder written by solv
     if solution.trajectory is None:
         raise ArgumentError("folder", str(folder), "a solution with a trajectory; this one has none: "
                             + solution.status)
-    with _Bar(f"{engine}", None):
+    with Bar(f"{engine}", None):
         report = validate_trajectory(solution.trajectory, solution.problem, engine=engine, picture=pictures)
     console.print(validation_table(report))
     write_validation(report, folder)
@@ -90,7 +74,6 @@ def validate(folder: Annotated[Path, typer.Argument(help="folder written by solv
     console.print(f"written to {folder}")
 
 
-@app.command()
 def schema(out: Annotated[Path | None, typer.Option(help="file to write; standard output without it")] = None) -> None:
     """Print the JSON schema of problem files, for editors."""
     from trajopt.problem import problem_schema
@@ -112,59 +95,9 @@ def _write(solution: Solution, out: Path, seed: int, pictures: bool) -> None:
     console.print(f"written to {out}")
 
 
-def _overrides(items: list[str] | None) -> dict[str, Any]:
-    """Dotted keys and their values, each value read as TOML, or as a bare string where it is none."""
-    found: dict[str, Any] = {}
-    for item in items or []:
-        key, sign, text = item.partition("=")
-        if not sign or not key:
-            raise ArgumentError("--set", item, "key=value, e.g. spline.duration=3.5")
-        try:
-            found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
-        except tomllib.TOMLDecodeError:
-            found[key.strip()] = text.strip()
-    return found
-
-
 def _budget(evaluations: int | None, seconds: float | None, target: float | None) -> Budget:
     from trajopt.optimize.base import DEFAULT_EVALUATIONS, Budget
 
     if evaluations is None and seconds is None:
         evaluations = DEFAULT_EVALUATIONS
     return Budget(evaluations, seconds, target)
-
-
-class _Bar:
-    """Progress on a terminal; nothing when the output is piped."""
-
-    def __init__(self, name: str, total: int | None) -> None:
-        self._progress = Progress(TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"),
-                                  TimeElapsedColumn(), console=Console(stderr=True), transient=True,
-                                  disable=not sys.stderr.isatty())
-        self._task = self._progress.add_task(name, total=total, best="")
-
-    def __enter__(self) -> _Bar:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def update(self, evaluations: int, best: float) -> None:
-        self._progress.update(self._task, completed=evaluations, best=f"best {best:.3g}")
-
-
-def main() -> None:
-    """Entry point: errors of the package become one line on standard error."""
-    try:
-        app()
-    except TrajoptError as error:
-        Console(stderr=True, soft_wrap=True).print(f"[red]error:[/red] {error}", markup=True, highlight=False)
-        sys.exit(UNUSABLE)
-    except KeyboardInterrupt:
-        Console(stderr=True).print("interrupted")
-        sys.exit(130)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,100 @@
+"""The command line as a user meets it: exit codes, one-line errors, files, silence when piped."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pandas as pd
+import pytest
+from conftest import ROOT
+
+SCENARIO = "problems/smdw/scenario_1_forward35.toml"
+RUN = "from trajopt.cli import main; main()"
+
+
+def trajopt(*arguments):
+    return subprocess.run([sys.executable, "-c", RUN, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True,
+                          timeout=300, check=False)
+
+
+@pytest.fixture(scope="module")
+def solved(tmp_path_factory):
+    """A run folder, without pictures."""
+    folder = tmp_path_factory.mktemp("run")
+    done = trajopt("solve", SCENARIO, "--out", folder, "--no-pictures")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_solve_writes_tables_that_others_read(solved):
+    summary = json.loads((solved / "summary.json").read_text())
+    assert summary["holds"]
+    table = pd.read_csv(solved / "trajectory.csv")
+    assert {"t_s", "x_m", "y_m", "yaw_rad"} <= set(table.columns)
+    assert table["t_s"].iloc[-1] == pytest.approx(summary["duration_s"])
+
+
+def test_nothing_but_the_table_when_piped(solved):
+    done = trajopt("solve", SCENARIO, "--optimizer", "pso", "--evaluations", 200)
+    assert done.stderr == ""
+    assert "\x1b" not in done.stdout
+    assert solved.exists()
+
+
+def test_a_solution_that_does_not_hold_exits_with_one():
+    done = trajopt("solve", SCENARIO, "--optimizer", "pso", "--evaluations", 100)
+    assert done.returncode == 1
+    assert "does not hold" in done.stdout
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (("solve", "nowhere.toml"), "existing problem file"),
+    (("solve", SCENARIO, "--set", "limits.sped=1"), "nearest is 'speed'"),
+    (("solve", SCENARIO, "--set", "limits"), "key=value"),
+    (("solve", SCENARIO, "--optimizer", "magic"), "one of pso"),
+    (("solve", SCENARIO, "--seed", "-1"), "whole number"),
+    (("solve", SCENARIO, "--seconds", "0"), "time > 0"),
+    (("solve", "problems/powerbot/experiment_1.toml"), "load_path_problem"),
+    (("validate", "nowhere"), "nowhere"),
+    (("explain", SCENARIO, "--engine", "magic", "--set", "spline.duration=0"), "spline.duration"),
+])
+def test_unusable_input_is_one_line_and_exit_two(arguments, words):
+    done = trajopt(*arguments)
+    assert done.returncode == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_x0_from_a_saved_solution(solved):
+    done = trajopt("solve", SCENARIO, "--optimizer", "nelder-mead", "--x0", solved, "--evaluations", 50)
+    assert done.returncode == 0, done.stdout
+
+
+def test_validate_a_saved_solution(solved):
+    pytest.importorskip("pybullet")
+    done = trajopt("validate", solved, "--no-pictures")
+    assert done.returncode == 0, done.stderr
+    assert json.loads((solved / "validation.json").read_text())
+    assert "build time" not in done.stdout
+
+
+@pytest.mark.parametrize("plan", [SCENARIO, "problems/powerbot/experiment_4.toml"])
+def test_explain_names_binding_limits(plan):
+    done = trajopt("explain", plan)
+    assert done.returncode == 0, done.stderr
+    assert "acceleration" in done.stdout
+
+
+def test_export_ends_at_rest(tmp_path):
+    file = tmp_path / "commands.csv"
+    assert trajopt("export", "problems/powerbot/experiment_1.toml", "--out", file).returncode == 0
+    table = pd.read_csv(file)
+    assert list(table.columns) == ["t", "v_left", "v_right"]
+    assert (table.iloc[-1, 1:] == 0).all()
+
+
+def test_schema_is_json():
+    assert json.loads(trajopt("schema").stdout)["type"] == "object"

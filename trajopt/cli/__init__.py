@@ -1,0 +1,30 @@
+"""The command line. Exit codes: 0 for a result that holds, 1 for one that does not, 2 for unusable input."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+from rich.console import Console
+
+from trajopt.cli import paths, search
+from trajopt.errors import TrajoptError
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
+                  help="Plan, time and check motions of wheeled ground robots.")
+for command in (search.solve, search.validate, paths.explain, paths.export, paths.compare, search.schema):
+    app.command()(command)
+
+UNUSABLE = 2
+
+
+def main() -> None:
+    """Entry point: errors of the package become one line on standard error."""
+    try:
+        app()
+    except TrajoptError as error:
+        Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, highlight=False)
+        sys.exit(UNUSABLE)
+    except KeyboardInterrupt:
+        Console(stderr=True).print("interrupted")
+        sys.exit(130)

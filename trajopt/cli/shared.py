@@ -1,0 +1,57 @@
+"""What several commands need: the console, options read as TOML, the progress bar."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from trajopt.errors import ArgumentError
+
+console = Console()
+
+FAULTY = 1
+
+ProblemFile = Annotated[Path, typer.Argument(help="problem file (*.toml)", show_default=False)]
+Overrides = Annotated[list[str] | None, typer.Option(
+    "--set", help="change a key of the problem, e.g. --set goal.wheels=[0,0,0,0]", show_default=False)]
+
+
+def overrides(items: list[str] | None) -> dict[str, Any]:
+    """Dotted keys and their values, each value read as TOML, or as a bare string where it is none."""
+    found: dict[str, Any] = {}
+    for item in items or []:
+        key, sign, text = item.partition("=")
+        if not sign or not key:
+            raise ArgumentError("--set", item, "key=value, e.g. spline.duration=3.5")
+        try:
+            found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key.strip()] = text.strip()
+    return found
+
+
+class Bar:
+    """Progress on a terminal; nothing when the output is piped."""
+
+    def __init__(self, name: str, total: int | None) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"), TimeElapsedColumn(),
+            console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
+        self._task = self._progress.add_task(name, total=total, best="")
+
+    def __enter__(self) -> Bar:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def update(self, evaluations: int, best: float) -> None:
+        """Show how many evaluations are used and the best cost so far."""
+        self._progress.update(self._task, completed=evaluations, best=f"best {best:.3g}")
