@@ -206,5 +206,5 @@ def test_without_a_turn_wheel_angles_cannot_be_chosen() -> None:
 def test_each_loader_says_what_the_other_is_for() -> None:
     with pytest.raises(ProblemError, match="load_maneuver"):
         load_problem(PROBLEMS / FILES[0])
-    with pytest.raises(ProblemError, match="obstacle"):
+    with pytest.raises(ProblemError, match="loc8-smdw"):
         load_maneuver(PROBLEMS / "scenario_1_lateral.toml")

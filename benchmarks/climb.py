@@ -1,0 +1,293 @@
+"""How often planned approaches climb: `python -m benchmarks.climb [--quick] [--engine E] [--trials N] [--parts ...]`.
+
+Parts: ``planned`` starts sub-test 2 at the states that three planners reach (exact lattice at the middle of the window,
+the thesis's PSO aiming at its own 0, uniform random wheel angles); ``driven`` executes the exact plan open loop first
+(sub-test 1); ``phases`` maps the climb over wheel phase, torque and friction. Every trial is seeded by its place.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
+from trajopt.maneuver import Configuration, Plan, approach_target, configurations, plan_configuration
+from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
+from trajopt.objectives.terminal import terminal_objective
+from trajopt.optimize.search import minimize
+from trajopt.problem import WHEELS, load_problem
+from trajopt.simulate.climb import Climb, Outcome, Rate, StepScene, climb_all, reached, run_approach
+from trajopt.simulate.engine import Command
+
+Array = NDArray[np.float64]
+
+FILES = {0.035: "step_3_5cm.toml", 0.05: "step_5cm.toml"}
+NAMES = {"lateral left": "lateral", "forward -35 deg": "forward35", "forward -45 deg": "forward45"}
+SCENARIO = {0.035: 2, 0.05: 1}
+# Thesis 000, sections 6.1, 6.1.1, 6.2: climbs in 10 runs (scenario 1 for 5 cm; both scenarios for 3.5 cm).
+THESIS = {("lateral", 0.05): "0/10", ("forward35", 0.05): "5/10", ("forward45", 0.05): "5-6/10",
+          ("lateral", 0.035): "4/10, 2/10", ("forward35", 0.035): "most, 10/10", ("forward45", 0.035): "most, 10/10"}
+FRICTION = (0.6, 1.0)  # range, issue's trials
+POSITION_SD, YAW_SD, WHEEL_SD = 0.003, math.radians(0.5), 0.05  # m, rad, rad: of the state a climb starts from; chosen
+START_POSITION_SD, START_YAW_SD, START_WHEEL_SD = 0.005, math.radians(0.5), 0.05  # of the start of an approach; chosen
+NEAREST = 0.004  # m, least gap a trial may start with
+PSO_SEARCHES = 5  # of the thesis's PSO, each serving an equal share of the trials
+PHASES = np.linspace(-2.4, 2.4, 9)  # rad, along the rotation, where the wheel meets the step
+TORQUES, FRICTIONS = (2.0, 4.0, 8.0), (0.5, 0.8)
+PACKAGES = ("numpy", "mujoco", "pybullet")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One row of the trial file."""
+
+    part: str
+    engine: str
+    height: float
+    configuration: str
+    source: str
+    number: int
+    friction: float
+    torque: float
+    critical_up: bool
+    first_attempt: bool
+    all_up: bool
+    exploded: bool
+    reason: str
+
+
+def step_scene(problem: ManeuverProblem, friction: float, torque: float | None = None) -> StepScene:
+    """The problem's step with another friction and torque."""
+    r = problem.robot
+    return StepScene(problem.obstacle.height, problem.obstacle.place, problem.obstacle.direction, friction,
+                     r.torque_limit if torque is None else torque, r.minor_radius, r.hub_depth, r.hub_gap)
+
+
+def plan_of(problem: ManeuverProblem, configuration: Configuration) -> Plan:
+    """The exact plan; these problems all have one."""
+    plan = plan_configuration(problem, configuration)
+    if not isinstance(plan, Plan):
+        raise SystemExit(f"{configuration.name}: {plan.reason}")
+    return plan
+
+
+def climb_from(problem: ManeuverProblem, plan: Plan, wheels: Array, rng: Generator, yaw_error: float = 0.0) -> Climb:
+    """Sub-test 2 from the plan's target with random state errors and friction, and the given wheel angles (4,)."""
+    x, y, yaw = plan.target.pose
+    dx = min(float(rng.normal(0.0, POSITION_SD)), problem.approach.gap - NEAREST)
+    shift = np.array([dx, rng.normal(0.0, POSITION_SD), yaw_error + rng.normal(0.0, YAW_SD)])
+    angles = wheels + rng.normal(0.0, WHEEL_SD, 4)
+    pose = _before_step(problem, np.array([x, y, yaw]) + shift)
+    c = plan.configuration
+    critical = (WHEELS.index(c.critical[0]), WHEELS.index(c.critical[1]))
+    return Climb(step_scene(problem, float(rng.uniform(*FRICTION))), pose, _four(angles), c.direction, critical,
+                 plan.target.travel)
+
+
+def _before_step(problem: ManeuverProblem, pose: Array) -> tuple[float, float, float]:
+    """The pose, moved back from the step where a corner would be nearer than NEAREST (steps along +x)."""
+    corners = np.array(problem.platform.footprint) @ np.array([math.cos(pose[2]), -math.sin(pose[2])])
+    room = problem.obstacle.place[0] - NEAREST - float(corners.max())
+    return min(float(pose[0]), room), float(pose[1]), float(pose[2])
+
+
+def _four(values: Array) -> tuple[float, float, float, float]:
+    a, b, c, d = (float(v) for v in values)
+    return a, b, c, d
+
+
+def pso_endings(height: float, name: str, searches: int) -> list[tuple[Array, float]]:
+    """Final wheel angles (4,) and yaw error that the thesis's PSO plans, through its actuators, aiming at 0."""
+    problem = load_problem(PROBLEMS / "smdw" / f"scenario_{SCENARIO[height]}_{name}.toml",
+                           {"goal.wheels": [0.0, 0.0, 0.0, 0.0], "actuator.enabled": True})
+    objective = terminal_objective(problem)
+    found = []
+    for seed in range(searches):
+        x = minimize(objective, objective.bounds, optimizer="pso-thesis-enhanced", seed=seed).x
+        end = objective.predict_exactly(x)
+        wheels = np.array([float(np.squeeze(v)) for v in end.wheels]) + np.array(problem.start.wheels)
+        found.append((wheels, float(np.squeeze(end.yaw)) - problem.goal.pose[2]))
+    return found
+
+
+def planned(engine: str, trials: int, workers: int) -> list[Trial]:
+    """Climb rates from the states that planners reach, state errors the same for all."""
+    rows = []
+    for height, file in FILES.items():
+        problem = load_maneuver(PROBLEMS / "smdw" / file)
+        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+            if configuration.name not in NAMES:
+                continue
+            name, plan = NAMES[configuration.name], plan_of(problem, configuration)
+            exact = plan.trajectory.at(plan.duration).wheel_angles[0] + np.array(problem.start.wheels)
+            endings = pso_endings(height, name, min(PSO_SEARCHES, trials))
+            for source in ("exact", "thesis PSO", "uniform"):
+                climbs = []
+                for n in range(trials):
+                    rng = np.random.default_rng([n, round(height * 1e4), list(NAMES.values()).index(name)])
+                    random = rng.uniform(-math.pi, math.pi, 4)
+                    pso, turned = endings[n % len(endings)]
+                    wheels = {"exact": exact, "thesis PSO": pso, "uniform": random}[source]
+                    climbs.append(climb_from(problem, plan, wheels, rng, turned if source == "thesis PSO" else 0.0))
+                rows += _rows("planned", engine, name, source, climbs, climb_all(climbs, engine=engine, workers=workers))
+    return rows
+
+
+def driven(engine: str, trials: int, workers: int) -> list[Trial]:
+    """Climb rates after the exact plan was driven open loop from a start with errors."""
+    rows = []
+    for height, file in FILES.items():
+        problem = load_maneuver(PROBLEMS / "smdw" / file)
+        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+            if configuration.name not in NAMES:
+                continue
+            plan = plan_of(problem, configuration)
+            climbs, lost = [], []
+            for n in range(trials):
+                rng = np.random.default_rng([n, 7, round(height * 1e4)])
+                climb = climb_from(problem, plan, np.zeros(4), rng)
+                recording = run_approach(climb.step, approach_command(problem, plan, rng), engine=engine)
+                if recording.exploded:
+                    lost.append(Outcome((False,) * 4, False, False, True, recording.reason, 0.0))
+                    continue
+                pose, wheels = reached(recording)
+                climbs.append(replace(climb, pose=_before_step(problem, np.array(pose)), wheels=wheels))
+            outcomes = climb_all(climbs, engine=engine, workers=workers)
+            rows += _rows("driven", engine, NAMES[configuration.name], "exact, open loop",
+                          climbs + climbs[:1] * len(lost), outcomes + lost)
+    return rows
+
+
+def approach_command(problem: ManeuverProblem, plan: Plan, rng: Generator) -> Command:
+    """The plan's wheel speeds from a start with random errors of pose and wheel angles."""
+    times = np.linspace(0.0, plan.duration, max(2, round(plan.duration / 0.002)))
+    errors = rng.normal(0.0, [START_POSITION_SD, START_POSITION_SD, START_YAW_SD])
+    pose = np.array(problem.start.pose) + errors
+    return Command(times, plan.trajectory.at(times).wheel_speeds, (float(pose[0]), float(pose[1]), float(pose[2])),
+                   _four(np.array(problem.start.wheels) + rng.normal(0.0, START_WHEEL_SD, 4)))
+
+
+def phases(engine: str, runs: int, workers: int) -> list[Trial]:
+    """Climbs over the phase at which the leading wheels meet the step, for torques and frictions."""
+    rows = []
+    for file in FILES.values():
+        problem = load_maneuver(PROBLEMS / "smdw" / file)
+        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+            if NAMES.get(configuration.name) not in ("lateral", "forward35"):
+                continue
+            for torque in TORQUES:
+                for friction in FRICTIONS:
+                    climbs = [_at_phase(problem, configuration, float(phase), friction, torque, n)
+                              for phase in PHASES for n in range(runs)]
+                    outcomes = climb_all(climbs, engine=engine, workers=workers)
+                    labels = [f"{phase:+.2f}" for phase in PHASES for _ in range(runs)]
+                    for label, climb, outcome in zip(labels, climbs, outcomes, strict=True):
+                        rows += _rows("phases", engine, NAMES[configuration.name], label, [climb], [outcome])
+    return rows
+
+
+def _at_phase(problem: ManeuverProblem, configuration: Configuration, phase: float, friction: float, torque: float,
+              number: int) -> Climb:
+    target = approach_target(problem, configuration, phase=configuration.window.middle)
+    spin = np.sign(problem.platform.inverse @ np.array([*configuration.direction, 0.0]))
+    wheels = np.array(target.wheels)
+    critical = (WHEELS.index(configuration.critical[0]), WHEELS.index(configuration.critical[1]))
+    for i in critical:
+        wheels[i] += spin[i] * (phase - configuration.window.middle)
+    rng = np.random.default_rng([number, 99])
+    pose = np.array(target.pose) + rng.normal(0.0, [0.0005, 0.0005, math.radians(0.1)])
+    return Climb(step_scene(problem, friction, torque), _before_step(problem, pose), _four(wheels),
+                 configuration.direction, critical, target.travel)
+
+
+def _rows(part: str, engine: str, name: str, source: str, climbs: Sequence[Climb],
+          outcomes: Sequence[Outcome]) -> list[Trial]:
+    return [Trial(part, engine, c.step.height, name, source, n, c.step.friction, c.step.torque, o.critical_up,
+                  o.first_attempt, o.all_up, o.exploded, o.reason)
+            for n, (c, o) in enumerate(zip(climbs, outcomes, strict=True))]
+
+
+def rate_table(title: str, trials: Sequence[Trial]) -> ResultTable:
+    """Rates with Wilson intervals, one row a cell, the thesis's count beside."""
+    rows = []
+    for key in dict.fromkeys((t.engine, t.height, t.configuration, t.source) for t in trials):
+        cell = [t for t in trials if (t.engine, t.height, t.configuration, t.source) == key]
+        shares = [_share([bool(getattr(t, what)) for t in cell if not t.exploded], sum(t.exploded for t in cell))
+                  for what in ("critical_up", "first_attempt", "all_up")]
+        rows.append((key[0], f"{100 * key[1]:g}", key[2], key[3], *(_text(s) for s in shares),
+                     str(shares[0].exploded), THESIS[key[2], key[1]]))
+    return ResultTable(title, ("engine", "step, cm", "configuration", "planned by", "critical wheels up",
+                               "first attempt", "all four up", "exploded", "thesis"), rows)
+
+
+def _share(values: list[bool], exploded: int) -> Rate:
+    return Rate(sum(values), len(values), exploded)
+
+
+def _text(share: Rate) -> str:
+    low, high = share.interval
+    return f"{share.successes}/{share.trials} ({low:.2f}-{high:.2f})"
+
+
+def phase_table(trials: Sequence[Trial]) -> ResultTable:
+    """Critical wheels up over phase: one row a torque and friction."""
+    rows = []
+    labels = [f"{phase:+.2f}" for phase in PHASES]
+    for key in dict.fromkeys((t.engine, t.height, t.configuration, t.torque, t.friction) for t in trials):
+        cell = [t for t in trials if (t.engine, t.height, t.configuration, t.torque, t.friction) == key]
+        counts = []
+        for label in labels:
+            sound = [t for t in cell if t.source == label and not t.exploded]
+            counts.append(f"{sum(t.critical_up for t in sound)}/{len(sound)}")
+        rows.append((key[0], f"{100 * key[1]:g}", key[2], f"{key[3]:g}", f"{key[4]:g}", *counts))
+    return ResultTable("Critical wheels up over phase where the wheel meets the step (rad along the rotation)",
+                       ("engine", "step, cm", "configuration", "torque, N m", "friction", *labels), rows)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="2 trials a cell, part 'planned' only")
+    parser.add_argument("--engine", default="mujoco", choices=("mujoco", "pybullet"))
+    parser.add_argument("--trials", type=int, default=20)
+    parser.add_argument("--runs", type=int, default=1, help="runs a cell of the phase map")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--parts", nargs="+", default=["planned", "driven", "phases"])
+    given = parser.parse_args(arguments)
+    trials, parts = (2, ["planned"]) if given.quick else (given.trials, given.parts)
+    name = f"climb_{given.engine}" + ("_quick" if given.quick else "")
+    tables: list[ResultTable] = []
+    rows: list[Trial] = []
+    for part in parts:
+        if part == "phases":
+            new = phases(given.engine, given.runs, given.workers)
+            tables.append(phase_table(new))
+        else:
+            new = {"planned": planned, "driven": driven}[part](given.engine, trials, given.workers)
+            tables.append(rate_table("Sub-test 2 from planned states" if part == "planned" else
+                                     "Sub-test 1 open loop, then sub-test 2", new))
+        rows += new
+        _keep(name, rows)
+        publish(name, tables, packages=PACKAGES, notes=[
+            "A wheel is up when its centre stays risen by 0.7 of the step's height over the last 0.2 s. First attempt: "
+            "within half a turn of meeting the step (forward: the leading wheel; lateral: both). Brackets: Wilson, "
+            f"95 %. Friction {FRICTION[0]}-{FRICTION[1]}, 8 N m, unless the row says otherwise. Exploded runs are "
+            "counted apart. Thesis: runs that climbed, in another simulator."])
+
+
+def _keep(name: str, rows: Sequence[Trial]) -> None:
+    OUT.mkdir(parents=True, exist_ok=True)
+    with (OUT / f"{name}_trials.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(asdict(rows[0])))
+        writer.writeheader()
+        writer.writerows(asdict(row) for row in rows)
+
+
+if __name__ == "__main__":
+    main()
