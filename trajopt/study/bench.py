@@ -140,6 +140,7 @@ class BenchRun:
         found = _search(problem, method, int(case["seed"]), Budget(self.evaluations, self.seconds))
         return {"dimension": problem.objective.dimension, "cost": found.fun, "violation": found.violation,
                 "feasible": found.violation <= FEASIBLE, "nfev": found.nfev,
+                "gradients": found.ngev,
                 "seconds": found.seconds, "construct_seconds": construct, "stop": found.status.name.lower(),
                 "message": found.message, "failures": found.failures, "first_failure": found.first_failure,
                 "reference": problem.reference, "best": problem.best, "cpu": _cpu(),

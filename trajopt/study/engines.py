@@ -79,6 +79,8 @@ def dask_local(workers: int, *, host: str = LOOPBACK, dashboard: str | None = No
                 n_workers=workers, threads_per_worker=1, processes=True, host=host, memory_limit=0, silence_logs=40,
                 dashboard_address=dashboard, worker_dashboard_address=dashboard and f"{host}:0") as cluster,
               distributed.Client(cluster) as client):
+            # Dask drops a worker that is down, even if only for a restart, some seconds after any death of it.
+            cluster.adapt(minimum=workers, maximum=workers, interval="1s")
             yield client.get_executor(pure=False)
 
     return Engine(f"Dask, {workers} local workers", start, workers)
