@@ -81,7 +81,8 @@ class OptimizeResult:
 
     ``fun`` and ``violation`` are recomputed by the objective at ``x`` after the search, more finely than the
     search saw it where the objective can (``search_fun`` is what the search saw). ``failures`` counts
-    evaluations that raised or were not finite; ``first_failure`` says what the first one was.
+    evaluations that raised or were not finite; ``first_failure`` says what the first one was. ``ngev`` counts
+    exact gradients, which are not among ``nfev`` (finite differences are).
     """
 
     x: Array
@@ -98,6 +99,7 @@ class OptimizeResult:
     seconds: float
     failures: int = 0
     first_failure: str = ""
+    ngev: int = 0
 
 
 class Optimizer(Protocol):
@@ -126,6 +128,7 @@ class Run:
     on_progress: Progress | None = None
     nfev: int = 0
     nit: int = 0
+    ngev: int = 0
     failures: int = 0
     first_failure: str = ""
     best_x: Array | None = None
@@ -268,7 +271,7 @@ class Run:
                           np.concatenate(self._samples) if self._samples else np.zeros((0, len(self.bounds))))
         return OptimizeResult(
             x, fun, violation, self.best_cost, self.nfev, self.nit, status in (Status.TARGET, Status.CONVERGED),
-            status, text, optimizer, history, self.elapsed, self.failures, self.first_failure)
+            status, text, optimizer, history, self.elapsed, self.failures, self.first_failure, self.ngev)
 
 
 def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:

@@ -154,6 +154,7 @@ class _Program:
         if not np.all(np.isfinite(x)):
             return start
         self.run.evaluate(x[None])
+        self.run.ngev += int(stats.get("n_call_nlp_grad_f", 0))
         self.run.spend(int(stats.get("n_call_nlp_f", 0)))
         return np.asarray(x)
 
