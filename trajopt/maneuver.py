@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -47,8 +48,10 @@ LARGEST_TURN = math.pi / 2  # rad, thesis 000 section 4.1.6: "does not exceed a 
 TIMED_CANDIDATES = 2  # paths that are time-scaled for each configuration, chosen
 RANKING_GRID = 40  # gridpoints of the time scaling that ranks candidates, chosen; the plan's own grid is the default
 WHEEL_TOLERANCE = 1e-6  # rad, of the critical wheels before physics
-# Sideways shifts (shares of the distance to the goal) of P1 and P2 around which exact paths are looked for; chosen.
-_BULGES = ((0.0, 0.0), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2), (0.2, 0.2), (-0.2, -0.2))
+# Sideways shifts (shares of the distance to the goal) of P1 and P2 around which exact paths are looked for: first a
+# few, then many; chosen.
+_FEW_BULGES = ((0.0, 0.0), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2), (0.2, 0.2), (-0.2, -0.2))
+_MANY_BULGES = tuple((a / 5, b / 5) for a in range(-3, 4) for b in range(-3, 4))
 # Share of trials that brought both leading wheels up, MuJoCo, friction 0.6-1, 8 N m, wheel angles at the window's
 # middle: (motion is lateral, step height m) -> rate. benchmarks/climb.py measures them.
 CLIMB_RATES = {(False, 0.035): 0.95, (False, 0.05): 0.9, (True, 0.035): 0.85, (True, 0.05): 0.9}
@@ -269,7 +272,7 @@ def plan_configuration(problem: ManeuverProblem, configuration: Configuration, *
     made = search_problem(problem, configuration, target)
     objective = ClearObjective(TerminalObjective(made, problem.platform), ground)
     if optimizer == "lattice":
-        candidates = _exact_candidates(objective)
+        objective, candidates = _lattice(objective, configuration)
     else:
         candidates = minimize(objective, objective.bounds, optimizer=optimizer, seed=seed, budget=budget).x[None]
     if len(candidates) == 0:
@@ -278,12 +281,24 @@ def plan_configuration(problem: ManeuverProblem, configuration: Configuration, *
     return _fastest(problem, configuration, target, objective, candidates)
 
 
-def _exact_candidates(objective: ClearObjective) -> Array:
+def _lattice(objective: ClearObjective, configuration: Configuration) -> tuple[ClearObjective, Array]:
+    """Exact candidates, looked for more widely where there are none: around more control points, then (forward
+    only, where physics shows that the phase counts modulo half a turn) with either hub facing the step."""
+    for bulges in (_FEW_BULGES, _MANY_BULGES):
+        candidates = _exact_candidates(objective, bulges)
+        if len(candidates) or (bulges is _MANY_BULGES and configuration.motion.lateral):
+            return objective, candidates
+    halved = objective.terminal.problem.replace({"objective.wheel_period": "pi"})
+    relaxed = replace(objective, terminal=replace(objective.terminal, problem=halved))
+    return relaxed, _exact_candidates(relaxed, _MANY_BULGES)
+
+
+def _exact_candidates(objective: ClearObjective, bulges: Sequence[tuple[float, float]]) -> Array:
     """(n, 4): exact control points whose footprint stays on free ground, least effort first."""
     part = objective.affine_part()
     box = objective.bounds[part.variables]
     found = []
-    for base in _bases(objective, part):
+    for base in _bases(objective, part, bulges):
         points, _ = lattice_points(replace(part, base=base), box)
         found.append(points)
     points = np.concatenate(found)
@@ -294,13 +309,13 @@ def _exact_candidates(objective: ClearObjective) -> Array:
     return np.asarray(points[np.argsort(objective.effort(points), kind="stable")])
 
 
-def _bases(objective: ClearObjective, part: AffinePart) -> list[Array]:
+def _bases(objective: ClearObjective, part: AffinePart, bulges: Sequence[tuple[float, float]]) -> list[Array]:
     """Control points around which exact ones are looked for: the default, bent to either side."""
     start, goal = objective.terminal.problem.start.pose, objective.terminal.problem.goal.pose
     chord = np.array([goal[0] - start[0], goal[1] - start[1]])
     aside = np.array([-chord[1], chord[0]])
     low, high = objective.bounds[:, 0], objective.bounds[:, 1]
-    return [np.clip(part.base + np.concatenate([a * aside, b * aside]), low, high) for a, b in _BULGES]
+    return [np.clip(part.base + np.concatenate([a * aside, b * aside]), low, high) for a, b in bulges]
 
 
 def _fastest(problem: ManeuverProblem, configuration: Configuration, target: Target, objective: ClearObjective,
