@@ -98,3 +98,17 @@ def test_export_ends_at_rest(tmp_path):
 
 def test_schema_is_json():
     assert json.loads(trajopt("schema").stdout)["type"] == "object"
+
+
+def test_plan_ranks_configurations_and_writes_run_folders(tmp_path):
+    done = trajopt("plan", "problems/smdw/step_5cm.toml", "--out", tmp_path, "--no-pictures")
+    assert done.returncode == 0, done.stderr
+    folders = sorted(f.name for f in tmp_path.iterdir())
+    assert len(folders) >= 3
+    assert json.loads((tmp_path / folders[0] / "summary.json").read_text())["holds"]
+    assert "lateral" in done.stdout
+
+
+@pytest.mark.parametrize("group", ["sweep", "bench"])
+def test_groups_are_mounted(group):
+    assert trajopt(group, "--help").returncode == 0

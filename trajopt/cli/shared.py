@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from trajopt.errors import ArgumentError
 
-console = Console()
+console = Console(width=None if sys.stdout.isatty() else 120)  # tables keep their shape when piped
 
 FAULTY = 1
 

@@ -1,0 +1,54 @@
+"""``trajopt plan``: how to meet a step, every configuration with an exact, timed path."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.table import Table
+
+from trajopt.cli.shared import FAULTY, Overrides, ProblemFile, console, overrides
+
+
+def plan(problem: ProblemFile, set_: Overrides = None,
+         optimizer: Annotated[str, typer.Option(help="lattice, or any optimizer by name")] = "lattice",
+         seed: Annotated[int, typer.Option(help="seed of everything random")] = 0,
+         out: Annotated[Path | None, typer.Option("--out", help="folder: a run folder a plan, best first")] = None,
+         pictures: Annotated[bool, typer.Option(help="draw pictures into the folders")] = True) -> None:
+    """Plan every configuration that can climb a step, best first."""
+    from trajopt.maneuver import plan_climb
+    from trajopt.maneuver_problem import load_maneuver
+
+    found = plan_climb(load_maneuver(problem, overrides(set_)), optimizer=optimizer, seed=seed)
+    console.print(f"[bold]{found.problem.title}[/bold]: {found.status} ({found.wall_time:.2f} s)", highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in ("configuration", "duration (s)", "target x, y (m), yaw (deg)", "wheel error (rad)", "room (cm)",
+                   "phase margin (rad)", "climb rate"):
+        table.add_column(column, justify="left" if column == "configuration" else "right")
+    for one in found.plans:
+        x, y, yaw = one.target.pose
+        table.add_row(one.configuration.name, f"{one.duration:.2f}", f"{x:.3f}, {y:.3f}, {math.degrees(yaw):.1f}",
+                      f"{one.wheel_error:.1e}", f"{100 * one.room:.1f}", f"{one.margin:.2f}", f"{one.climb_rate:.0%}")
+    if found.plans:
+        console.print(table)
+    for one in found.refused:
+        console.print(f"no plan for {one.configuration.name}: {one.reason}", highlight=False)
+    if out is not None:
+        from trajopt.optimize.given import Given
+        from trajopt.pipeline import solve
+        from trajopt.report.pictures import save_pictures
+        from trajopt.report.run_folder import write_solution
+
+        for rank, one in enumerate(found.plans, start=1):
+            folder = out / f"{rank}_{one.configuration.name.replace(' ', '_')}"
+            solution = solve(one.problem, optimizer=Given(), x0=one.control_points[1:3, :2].ravel())
+            write_solution(solution, folder, seed=seed, command=" ".join(sys.argv))
+            if pictures:
+                save_pictures(solution, folder)
+        console.print(f"written to {out}", highlight=False)
+    if not found.plans:
+        raise typer.Exit(FAULTY)
