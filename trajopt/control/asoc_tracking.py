@@ -185,7 +185,7 @@ def _driven(geometry: AsocGeometry, ground: HeightMap, reference: Reference, kno
         place, velocity = reference.at(float(moment))
         rows.append((pose, estimate, place, slope, tilt, wheel.airborne))
         known = tilt * sees, slope * sees[..., None]
-        wanted = wheel_commands(geometry, alpha, _command(estimate, place + origins, velocity), *known)
+        wanted = wheel_commands(geometry, alpha, commanded_twist(estimate, place + origins, velocity), *known)
         speeds = _wheel_loop(geometry, speeds, wanted, friction, step)
         rolled = speeds * (1 - CREEP * np.clip(np.tan(slope) / friction, -1.0, 1.0))
         twist = body_twist(geometry, alpha, rolled, tilt, slope, 1.0 - wheel.airborne, twist)
@@ -213,7 +213,7 @@ class _Wheels:
                        flies.astype(np.float64))
 
 
-def _command(estimate: Array, place: Array, velocity: Array) -> Array:
+def commanded_twist(estimate: Array, place: Array, velocity: Array) -> Array:
     """(M, 3): body twist from the wanted world velocity and the pose error as the controller sees it."""
     world = velocity + POSITION_GAIN * (place - estimate[:, :2])
     c, s = np.cos(estimate[:, 2]), np.sin(estimate[:, 2])
