@@ -35,7 +35,7 @@ def draw_robot(axes: Axes, robot: Platform, pose: Array, colour: str = GREY, *, 
                label: str | None = None, **options: Any) -> None:
     """Outline of the robot with a triangle at its front; ``strong`` for the poses that matter."""
     corners = np.asarray(robot.footprint, dtype=np.float64)
-    front, half = corners[:, 0].max(), np.ptp(corners[:, 1]) * 0.16
+    front, half = corners[:, 0].max(), np.ptp(corners[:, 1]) * 0.09  # slender, so that it points
     nose = np.array([[front, 0.0], [front - _NOSE * np.ptp(corners[:, 0]), half],
                      [front - _NOSE * np.ptp(corners[:, 0]), -half]])
     width, shade = (1.5, 0.9) if strong else (0.7, 0.25)
