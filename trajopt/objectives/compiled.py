@@ -19,10 +19,12 @@ Array = NDArray[np.float64]
 
 S3, S5, S7, S9 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880  # Taylor coefficients of the sine
 C2, C4, C6, C8, C10 = -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800  # and of the cosine
+# Fast-math without reassociation, which would cancel (m + h) - (m - h) to 2 h and lose the digits of short spans.
+STRICT = {"nsz", "contract"}
 MAX_INCREMENT = 0.2  # rad; the first dropped term of the series is below 1e-17 there
 
 
-@numba.njit(inline="always", fastmath=True)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
 def _turned(c, s, a):  # type: ignore[no-untyped-def]
     """(cos, sin) turned by the small angle a."""
     q = a * a
@@ -31,7 +33,7 @@ def _turned(c, s, a):  # type: ignore[no-untyped-def]
     return c * cos - s * sin, s * cos + c * sin
 
 
-@numba.njit(inline="always", fastmath=True)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
 def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]
     """Actuator.step_mean on scalars, without branches."""
     low, high = mean - half, mean + half
@@ -45,7 +47,7 @@ def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]
     return single if small else total / (1.0 if small else span)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)  # type: ignore[untyped-decorator]
 def _kernel(node, rate, g0, g1, g2, r0, r1, r2, weights, width, inverse, forward, sat, dz,
             x, y, yaw, duration, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` (3 + 4, n) with final x, y, yaw and the wheel travel of n candidates (four wheels)."""

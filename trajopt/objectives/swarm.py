@@ -16,14 +16,13 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from trajopt.objectives.compiled import C2, C4, C6, C8, C10, S3, S5, S7, S9
+from trajopt.objectives.compiled import C2, C4, C6, C8, C10, S3, S5, S7, S9, STRICT
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
 
 Array = NDArray[np.float64]
 
 LANES = 4  # candidates a block: one vector of doubles (AVX2); 8 and 16 measured slower, registers spill
-_STRICT = {"nsz", "contract"}  # fast-math that cannot cancel (d + h) - (d - h) to 2 h
 # Rows of a block's state, each LANES long.
 _Y1, _X2, _Y2, _SAT, _DZ, _TINY, _COS, _SIN, _TURN = (LANES * i for i in range(1, 10))
 _SUM_X, _SUM_Y, _SUM_YAW, _W0, _W1, _W2, _W3 = (LANES * i for i in range(10, 17))
@@ -31,7 +30,7 @@ _ROWS = 17
 _SUMS = 10  # first row that is added up over the steps
 
 
-@numba.njit(inline="always", fastmath=_STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
 def _step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
     """Actuator.step_mean in wheel travel: mean d, half-span h, limits as travel a step.
 
@@ -46,7 +45,7 @@ def _step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
     return total / (high - low)
 
 
-@numba.njit(inline="always", fastmath=_STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
 def _turned(c, s, a):  # type: ignore[no-untyped-def]
     """(cos, sin) turned by the small angle a."""
     q = a * a
@@ -55,7 +54,7 @@ def _turned(c, s, a):  # type: ignore[no-untyped-def]
     return c * cos - s * sin, s * cos + c * sin
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=_STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)  # type: ignore[untyped-decorator]
 def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
     """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in place."""
     i00, i01, i10, i11 = inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1]

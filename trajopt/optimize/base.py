@@ -155,7 +155,7 @@ class Run:
             self.stop(Status.EVALUATIONS)
         result = self._guarded(candidates)
         violation, low, high = result.violation, self.bounds[:, 0], self.bounds[:, 1]
-        if (candidates < low).any() or (candidates > high).any():
+        if np.count_nonzero(candidates < low) or np.count_nonzero(candidates > high):
             outside = np.maximum(low - candidates, candidates - high)
             violation = violation + np.maximum(outside, 0.0).sum(axis=1)
         self._record(candidates, result.cost, violation)
@@ -188,7 +188,7 @@ class Run:
                                   np.concatenate([p.violation for p in parts]))
             return self._failed(np.full(1, np.inf), np.full(1, np.inf), np.ones(1, bool),
                                 f"{type(error).__name__}: {error}")
-        if math.isfinite(cost.sum() + violation.sum()):  # then each of them is; the usual case, and quick
+        if math.isfinite(np.add.reduce(cost) + np.add.reduce(violation)):  # then each of them is; the usual case, and quick
             return Evaluation(cost, violation)
         bad = ~(np.isfinite(cost) & np.isfinite(violation))
         if bad.any():
@@ -286,7 +286,7 @@ def better(cost: float, violation: float, than_cost: float, than_violation: floa
 
 def best_index(cost: Array, violation: Array) -> int:
     """Index of the best candidate under Deb's rule."""
-    if not violation.any():  # the usual case, and quick
+    if not np.count_nonzero(violation):  # the usual case, and quick
         return int(cost.argmin())
     feasible = violation <= FEASIBLE
     if feasible.any():

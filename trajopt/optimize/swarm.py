@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -59,6 +61,11 @@ class Swarm:
         i = best_index(self.own_cost, self.own_violation)
         self._reached = float(self.own_cost[i]), float(self.own_violation[i])
         self._gains = np.array([self.rules.cognitive, self.rules.social])[:, None, None]
+        self._low, self._high = np.ascontiguousarray(self.bounds.T)
+        width = self._high - self._low
+        self._rest = _COLLAPSED * width
+        self._limit = width * (np.inf if self.rules.velocity_limit is None else self.rules.velocity_limit)
+        self._kernel = _kernel()
         self._pulls = np.empty((2, *self.x.shape))
 
     @classmethod
@@ -83,8 +90,11 @@ class Swarm:
 
     def learn(self, cost: Array, violation: Array) -> None:
         """``tell`` without its checks: costs and violations (n,) of all particles, none NaN."""
-        self._remember(cost, violation)
-        leader = best_index(self.own_cost, self.own_violation)
+        if self._kernel is None:
+            self._remember(cost, violation)
+            leader = best_index(self.own_cost, self.own_violation)
+        else:
+            leader = self._kernel.remember(self.x, self.own, self.own_cost, self.own_violation, cost, violation)
         reached = self.own_cost[leader], self.own_violation[leader]
         self.idle = 0 if better(*reached, *self._reached) else self.idle + 1
         self._reached = float(reached[0]), float(reached[1])
@@ -100,9 +110,9 @@ class Swarm:
     @property
     def collapsed(self) -> bool:
         """Whether all particles rest at one point, so that nothing can change any more."""
-        width = self.bounds[:, 1] - self.bounds[:, 0]
-        return bool(np.abs(self.v[0, 0]) <= _COLLAPSED * width[0] and np.all(np.abs(self.v) <= _COLLAPSED * width)
-                    and np.all(np.abs(self.x - self.x[0]) <= _COLLAPSED * width))
+        if abs(float(self.v[0, 0])) > self._rest[0]:  # the usual case, and quick
+            return False
+        return bool(np.all(np.abs(self.v) <= self._rest) and np.all(np.abs(self.x - self.x[0]) <= self._rest))
 
     # -- saving ---------------------------------------------------------------------------------------
 
@@ -160,14 +170,15 @@ class Swarm:
     def _remember(self, cost: Array, violation: Array) -> None:
         """Update own bests by Deb's rule."""
         improved = cost < self.own_cost
-        if violation.any() or self.own_violation.any():
+        if np.count_nonzero(violation) or np.count_nonzero(self.own_violation):
             new, old = violation <= FEASIBLE, self.own_violation <= FEASIBLE
             less = (violation < self.own_violation) | ((violation == self.own_violation) & improved)
             improved = np.where(new & old, improved, np.where(new | old, new, less))
             self.own_violation[improved] = violation[improved]
         rows = improved.nonzero()[0]
-        self.own[rows] = self.x[rows]
-        self.own_cost[rows] = cost[rows]
+        if len(rows):
+            self.own[rows] = self.x[rows]
+            self.own_cost[rows] = cost[rows]
 
     def _ring_leaders(self) -> NDArray[np.intp]:
         """(n,): the best own position among each particle's neighbours and itself."""
@@ -181,23 +192,32 @@ class Swarm:
 
     def _move(self, leader: Array) -> None:
         rules, x, v = self.rules, self.x, self.v
-        pulls = self._pulls
+        r = self.rng.random(self._pulls.shape)
+        low, high = self._low, self._high
+        if self._kernel is not None and leader.ndim == 1:
+            outside = self._kernel.move(x, v, self.own, leader, r, self._inertia(), rules.cognitive, rules.social,
+                                        low, high, self._limit)
+            if not outside:
+                return
+        else:
+            self._move_readably(leader, r)
+        if rules.boundary in ("reset", "reflect", "absorb"):
+            below, above = x < low, x > high
+            if np.count_nonzero(below) or np.count_nonzero(above):
+                _bring_back(rules.boundary, x, v, low, high, below | above, self.rng)
+
+    def _move_readably(self, leader: Array, r: Array) -> None:
+        x, v, pulls = self.x, self.v, self._pulls
         np.subtract(self.own, x, out=pulls[0])
         np.subtract(leader, x, out=pulls[1])
         pulls *= self._gains
-        pulls *= self.rng.random(pulls.shape)
+        pulls *= r
         v *= self._inertia()
         v += pulls[0]
         v += pulls[1]
-        low, high = self.bounds.T
-        if rules.velocity_limit is not None:
-            limit = rules.velocity_limit * (high - low)
-            np.clip(v, -limit, limit, out=v)
+        if self.rules.velocity_limit is not None:
+            np.clip(v, -self._limit, self._limit, out=v)
         x += v
-        if rules.boundary in ("reset", "reflect", "absorb"):
-            below, above = x < low, x > high
-            if below.any() or above.any():
-                _bring_back(rules.boundary, x, v, low, high, below | above, self.rng)
 
     def _inertia(self) -> float:
         rules = self.rules
@@ -223,6 +243,18 @@ def _bring_back(boundary: str, x: Array, v: Array, low: Array, high: Array, outs
         # Thesis 000, Table 5.4: anew, inside 0.9 of the space.
         x[rows] = low + width / 2 + 0.9 * (rng.random((int(rows.sum()), x.shape[1])) - 0.5) * width
         v[rows] = 0.0
+
+
+def _kernel() -> Any:
+    """The compiled iteration where numba has been loaded already (by a compiled objective, say); else None.
+
+    Loading numba takes longer than it saves in one search. Both forms give the same bits.
+    """
+    if "numba" not in sys.modules:
+        return None
+    from trajopt.optimize import swarm_kernel
+
+    return swarm_kernel
 
 
 def _positions(rules: SwarmRules, bounds: Array, rng: Generator) -> Array:

@@ -1,0 +1,64 @@
+"""One iteration of a global-best swarm as a numba kernel: the same bits as the NumPy form of ``swarm``.
+
+No fast-math, so that every operation is rounded as NumPy rounds it; a test holds the two together exactly.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from trajopt.optimize.base import FEASIBLE
+
+
+@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[no-untyped-def]
+    """Update own bests in place by Deb's rule; the index of the swarm's best."""
+    n, d = x.shape
+    for i in range(n):
+        new, old = violation[i] <= FEASIBLE, own_violation[i] <= FEASIBLE
+        if new and old:
+            improved = cost[i] < own_cost[i]
+        elif new or old:
+            improved = new
+        else:
+            improved = violation[i] < own_violation[i] or (violation[i] == own_violation[i] and cost[i] < own_cost[i])
+        if improved:
+            own_cost[i], own_violation[i] = cost[i], violation[i]
+            for j in range(d):
+                own[i, j] = x[i, j]
+    best, feasible = 0, own_violation[0] <= FEASIBLE
+    for i in range(1, n):
+        inside = own_violation[i] <= FEASIBLE
+        if inside and not feasible:
+            best, feasible = i, True
+        elif inside and own_cost[i] < own_cost[best]:
+            best = i
+        elif not feasible and own_violation[i] < own_violation[best]:
+            best = i
+    return best
+
+
+@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def move(x, v, own, leader, r, inertia, cognitive, social, low, high, limit):  # type: ignore[no-untyped-def]
+    """Velocities and positions after one iteration, in place; how many coordinates lie outside."""
+    n, d = x.shape
+    outside = 0
+    for i in range(n):
+        for j in range(d):
+            p = (own[i, j] - x[i, j]) * cognitive * r[0, i, j]
+            q = (leader[j] - x[i, j]) * social * r[1, i, j]
+            speed = v[i, j] * inertia + p + q
+            speed = min(max(speed, -limit[j]), limit[j])
+            v[i, j] = speed
+            x[i, j] += speed
+            outside += x[i, j] < low[j] or x[i, j] > high[j]
+    return outside
+
+
+def warm() -> None:
+    """Load both kernels from the cache, or compile them."""
+    x, one = np.zeros((2, 1)), np.ones(1)
+    cost = np.zeros(2)
+    remember(x, x.copy(), cost.copy(), cost.copy(), cost, cost)
+    move(x, x.copy(), x.copy(), one, np.zeros((2, 2, 1)), 0.5, 0.5, 0.5, -one, one, one)
