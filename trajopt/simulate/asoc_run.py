@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +52,7 @@ class AsocBody:
         if not (np.isfinite(self.friction) and self.friction > 0):
             raise ArgumentError("friction", self.friction, "a friction coefficient > 0")
         if self.body_mass <= 0:
-            raise ArgumentError("geometry", self.geometry, f"wheels that leave mass for the body out of {TOTAL_MASS} kg")
+            raise ArgumentError("geometry", self.geometry, f"wheels that leave mass out of {TOTAL_MASS} kg")
 
     @property
     def wheel_mass(self) -> float:
@@ -153,7 +153,7 @@ def run_asoc(session: AsocSession, robot: AsocBody, ground: HeightMap, reference
     begun = time.perf_counter()
     for _ in range(round(SETTLE / STEP)):
         session.advance(still, still[:, 0])
-    rows: list[tuple[Array, ...]] = []
+    rows: list[tuple[NDArray[Any], ...]] = []
     control = STEP * CONTROL_STRIDE
     for moment in np.arange(0.0, reference.duration + control / 2, control):
         now = session.state()
