@@ -35,8 +35,8 @@ def plan(problem: ProblemFile, set_: Overrides = None,
                       f"{one.wheel_error:.1e}", f"{100 * one.room:.1f}", f"{one.margin:.2f}", f"{one.climb_rate:.0%}")
     if found.plans:
         console.print(table)
-    for one in found.refused:
-        console.print(f"no plan for {one.configuration.name}: {one.reason}", highlight=False)
+    for none in found.refused:
+        console.print(f"no plan for {none.configuration.name}: {none.reason}", highlight=False)
     if out is not None:
         from trajopt.optimize.given import Given
         from trajopt.pipeline import solve
