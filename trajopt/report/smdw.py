@@ -8,7 +8,6 @@ from pathlib import Path as FilePath
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from rich.table import Table
 
 from trajopt.maneuver import Maneuver, Plan
 from trajopt.report.ground_plan import draw_robot
@@ -26,25 +25,6 @@ from trajopt.robots.smdw_geometry import DoubleWheel, meet_step
 Array = NDArray[np.float64]
 
 _OUTLINES = 7  # robot outlines drawn along a path
-
-
-def maneuver_table(maneuver: Maneuver) -> Table:
-    """Plans, best first, then the refused configurations with their reasons."""
-    table = Table(title=maneuver.problem.title, title_justify="left",
-                  caption=f"{maneuver.status} ({maneuver.wall_time:.2f} s)", caption_justify="left")
-    for name in ("configuration", "target x, y, yaw (m, m, deg)", "critical wheels (rad)", "duration (s)",
-                 "wheel error (rad)", "room (m)", "phase margin (rad)", "climb rate"):
-        table.add_column(name)
-    for plan in maneuver.plans:
-        x, y, yaw = plan.target.pose
-        wheels = ", ".join(f"{w} {plan.target.wheels[i]:+.2f}" for w, i in
-                           zip(plan.configuration.critical, plan.problem.goal.critical_indices, strict=True))
-        table.add_row(plan.configuration.name, f"{x:.3f}, {y:.3f}, {math.degrees(yaw):.0f}", wheels,
-                      f"{plan.duration:.2f}", f"{plan.wheel_error:.0e}", f"{plan.room:.3f}", f"{plan.margin:.2f}",
-                      f"{plan.climb_rate:.2f}")
-    for refused in maneuver.refused:
-        table.add_row(refused.configuration.name, refused.reason, *[""] * 6)
-    return table
 
 
 def geometry_figure(wheel: DoubleWheel, height: float) -> Figure:
@@ -102,7 +82,7 @@ def cam_figure(wheel: DoubleWheel, fitted: DoubleWheel) -> Figure:
     low, high = region_of_contact(wheel)
     left.set(title="Contact offset", xlabel="wheel angle (deg)", ylabel=f"offset (cm), region {100 * low:.0f} to "
                                                                         f"{100 * high:.1f}")
-    left.legend(frameon=False)
+    left.legend(frameon=False, loc="lower center")
     heights = np.linspace(0.02, wheel.greatest_clearance - 1e-4, 60)
     for motion, alpha, colour, label in ((Motion.LEFT, 0.0, VERMILION, "lateral"),
                                          (Motion.FORWARD, math.radians(-35), BLUE, "forward -35 deg"),
@@ -120,7 +100,7 @@ def plans_figure(maneuver: Maneuver) -> Figure:
     """Every plan on the ground: path, outlines of the robot, the step and the space."""
     count = max(len(maneuver.plans), 1)
     rows = math.ceil(count / 3)
-    figure = new_figure(3.0 * rows + 0.4, 8.4)
+    figure = new_figure(2.6 * rows + 0.3, 8.4)
     for k, ax in enumerate(np.atleast_1d(figure.subplots(rows, min(count, 3), squeeze=False)).ravel()):
         if k < len(maneuver.plans):
             _draw_plan(ax, maneuver, maneuver.plans[k])

@@ -1,0 +1,118 @@
+"""The controller without physics: odometry, filter, and re-solved paths against their definitions."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trajopt.control.approach import (
+    Estimate,
+    Goal,
+    Sensors,
+    approach_controller,
+    correct,
+    predict,
+    reference_of,
+    resolved,
+    wheel_path,
+)
+from trajopt.errors import ArgumentError
+from trajopt.maneuver import Plan, configurations, plan_configuration
+from trajopt.maneuver_problem import load_maneuver
+from trajopt.paths.path import Path as RobotPath
+from trajopt.problem import WHEELS
+from trajopt.robots.smdw import loc8_smdw
+from trajopt.timing.scaling import time_scale
+
+FILE = Path(__file__).parents[2] / "problems" / "smdw" / "step_5cm.toml"
+ROBOT = loc8_smdw()
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    problem = load_maneuver(FILE)
+    found = plan_configuration(problem, configurations(problem.robot.wheel, problem.obstacle)[0])
+    assert isinstance(found, Plan)
+    return found
+
+
+def critical(plan: Plan) -> tuple[int, ...]:
+    return tuple(WHEELS.index(w) for w in plan.configuration.critical)
+
+
+def test_odometry_follows_the_plan(plan: Plan) -> None:
+    reference = reference_of(plan.trajectory, np.zeros(4))
+    estimate = Estimate(reference.pose[0], np.zeros((3, 3)))
+    for before, after in zip(reference.wheels[:-1], reference.wheels[1:], strict=True):
+        estimate = predict(estimate, ROBOT, after - before)
+    assert estimate.pose == pytest.approx(reference.pose[-1], abs=2e-3)
+    assert np.linalg.eigvalsh(estimate.covariance).min() > 0
+
+
+def test_wheel_path_agrees_with_the_exact_wheel_angles(plan: Plan) -> None:
+    reference = reference_of(plan.trajectory, np.zeros(4))
+    assert wheel_path(ROBOT, reference.pose)[-1] == pytest.approx(reference.wheels[-1], abs=2e-3)
+
+
+def test_measurements_shrink_the_error() -> None:
+    truth = np.array([1.0, 2.0, math.pi - 0.01])
+    estimate = Estimate(truth + np.array([0.02, -0.02, 0.05]), np.diag([0.02, 0.02, 0.05]) ** 2)
+    rng = np.random.default_rng(1)
+    for _ in range(60):
+        measured = truth + rng.normal(0, 1, 3) * [0.005, 0.005, 0.009]
+        measured[2] = (measured[2] + math.pi) % (2 * math.pi) - math.pi  # a sensor's yaw jumps at half a turn
+        estimate = correct(estimate, measured, Sensors())
+    assert estimate.pose == pytest.approx(truth, abs=4e-3)
+    assert np.sqrt(np.diag(estimate.covariance)).max() < 2e-3
+
+
+@pytest.mark.parametrize("when", [0.0, 1.0, 2.0])
+def test_a_resolved_path_starts_here_and_ends_at_the_goal_with_its_wheel_angles(plan: Plan, when: float) -> None:
+    reference = reference_of(plan.trajectory, np.zeros(4))
+    goal = Goal(reference.pose[-1], reference.wheels[-1], critical(plan), 30.0)
+    _, here = reference.at(when)
+    estimate = here + np.array([0.008, -0.006, 0.01])
+    wheels = reference.wheels_at(when)[0] + [0.15, -0.1, 0.1, -0.05]
+    new = resolved(reference, when, estimate, wheels, goal, ROBOT)
+    assert new.pose[0] == pytest.approx(estimate, abs=1e-12)
+    assert new.wheels[0] == pytest.approx(wheels, abs=1e-12)
+    assert np.abs(new.pose[-1] - goal.pose) == pytest.approx(np.zeros(3), abs=4e-3)
+    errors = (new.wheels[-1] - goal.wheels)[list(goal.critical)]
+    assert np.abs(errors).max() < 0.03
+    pose_only = resolved(reference, when, estimate, wheels, goal, ROBOT, phase=False)
+    assert pose_only.pose[-1] == pytest.approx(goal.pose, abs=1e-12)
+    assert np.abs((pose_only.wheels[-1] - goal.wheels)[list(goal.critical)]).max() > 3 * np.abs(errors).max()
+
+
+def test_time_is_stretched_below_the_wheel_speed_cap(plan: Plan) -> None:
+    reference = reference_of(plan.trajectory, np.zeros(4))
+    goal = Goal(reference.pose[-1], reference.wheels[-1], critical(plan), 5.0)
+    new = resolved(reference, 1.0, reference.at(1.0)[1], reference.wheels_at(1.0)[0], goal, ROBOT)
+    speeds = np.abs(np.diff(new.wheels, axis=0)) / np.diff(new.times)[:, None]
+    assert speeds.max() == pytest.approx(5.0, rel=1e-9)
+    assert new.times[-1] > reference.times[-1]
+
+
+def test_kinematic_closed_loop_removes_start_errors(plan: Plan) -> None:
+    """A robot that rolls without slip, started off its place: with the controller pose and phase meet."""
+    rng = np.random.default_rng(2)
+    control = approach_controller(plan.trajectory, ROBOT, np.zeros(4), critical(plan), cap=30.0,
+                                  sensors=Sensors(position=0.0, yaw=0.0), rng=rng)
+    truth, wheels, dt = control.reference.pose[0] + [0.01, -0.01, 0.017], np.zeros(4), 0.01
+    for k in range(round((plan.duration + 1.0) / dt)):
+        turned = control.step(k * dt, truth, wheels) * dt
+        truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, turned).pose
+        wheels = wheels + turned
+    assert truth == pytest.approx(control.goal.pose, abs=4e-3)
+    assert np.abs((wheels - control.goal.wheels)[list(control.goal.critical)]).max() < 0.05
+
+
+def test_too_little_turn_is_refused() -> None:
+    path = RobotPath.through([[0, 0], [1, 0], [2, 0]], heading=[0.0, 0.1, 0.2])
+    trajectory = time_scale(path, load_maneuver(FILE).limits.as_limits(), robot=ROBOT)
+    with pytest.raises(ArgumentError, match="30 deg of turn"):
+        approach_controller(trajectory, ROBOT, np.zeros(4), (0, 2), cap=30.0, rng=np.random.default_rng(0))
+    approach_controller(trajectory, ROBOT, np.zeros(4), (0, 2), cap=30.0, mode="pose", rng=np.random.default_rng(0))
+    with pytest.raises(ArgumentError, match="sensors"):
+        Sensors(period=0.0)
