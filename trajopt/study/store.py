@@ -34,7 +34,7 @@ from trajopt.study.rows import DONE, RUN_COLUMNS, arrow
 
 FORMAT = 1
 _STALE = 24 * 3600.0  # s after which a temporary file's writer is taken for dead; chosen
-_READ_TRIES = 5  # listings of the parts before giving up, while compactions go on meanwhile; chosen
+_READ_TRIES = 100  # listings of the parts before giving up, while compactions go on meanwhile; chosen
 _COMPACT_ROWS = 1_000_000  # rows of one compacted part, to bound memory; chosen
 
 
@@ -143,26 +143,32 @@ class Store:
         pa = arrow()
         import pyarrow.parquet as pq
 
+        tables: dict[Path, Any] = {}  # parts never change, so what was read once stays good
         for attempt in range(_READ_TRIES):
-            tables = []
-            try:
-                for file in self.parts(folder):
+            gone = False
+            for file in self.parts(folder):
+                if file in tables:
+                    continue
+                try:
                     wanted = None
                     if columns is not None:
                         names = pq.read_schema(file).names
                         wanted = [n for n in dict.fromkeys(["case", "status", *columns]) if n in names]
                     # One thread: parts are small, and workers must not outnumber their cores.
-                    tables.append(pq.read_table(file, columns=wanted, use_threads=False, memory_map=False,
-                                                filters=[where] if where else None))
+                    tables[file] = pq.read_table(file, columns=wanted, use_threads=False, memory_map=False,
+                                                 filters=[where] if where else None)
+                except FileNotFoundError:  # compacted away between listing and reading: list again
+                    gone = True
+                except (pa.ArrowInvalid, OSError) as error:
+                    raise StoreError(f"{file}: a damaged part ({error}); move it away and run the sweep again") from None
+            if not gone:
                 break
-            except FileNotFoundError:  # compacted away between listing and reading
-                if attempt == _READ_TRIES - 1:
-                    raise
-            except (pa.ArrowInvalid, OSError) as error:
-                raise StoreError(f"{file}: a damaged part ({error}); move it away and run the sweep again") from None
+            time.sleep(0.01 * attempt)
+        else:
+            raise StoreError(f"{self.path}: compactions go on without end; read when they are done")
         if not tables:
             return pa.table({"case": pa.array([], pa.string()), "status": pa.array([], pa.string())})
-        return pa.concat_tables(tables, promote_options="permissive")
+        return pa.concat_tables(tables.values(), promote_options="permissive")
 
     # -- upkeep ---------------------------------------------------------------------------------------
 
@@ -178,7 +184,12 @@ class Store:
             batch: list[Path] = []
             rows = 0
             for file in [*self.parts(folder), None]:
-                count = pq.read_metadata(file).num_rows if file else 0
+                count = 0
+                if file is not None:
+                    try:
+                        count = pq.read_metadata(file).num_rows
+                    except FileNotFoundError:  # another compaction was here
+                        continue
                 if batch and (file is None or rows + count > _COMPACT_ROWS):
                     self._merge(folder, batch)
                     batch, rows = [], 0

@@ -105,13 +105,14 @@ def _run_function(data: Mapping[str, Any], problem: Problem | ManeuverProblem | 
 def _check_names(first: Mapping[str, Any], problem: Problem | ManeuverProblem, derived: Mapping[str, str],
                  exclude: Any, *, uses_problem_only: bool) -> None:
     """Find wrong names now and not in a million rows."""
+    unknown = [n for n in first if n.startswith("run.") and n not in RUN_NAMES]
+    if unknown:
+        raise ArgumentError(f"axes.{unknown[0]}", first[unknown[0]], "one of " + ", ".join(RUN_NAMES))
     problem.replace(changes(first))
     if not uses_problem_only:
         return
     used = " ".join([*map(str, derived.values()), *([exclude] if isinstance(exclude, str) else exclude)])
     for name in first:
-        if name.startswith("run.") and name not in RUN_NAMES:
-            raise ArgumentError(f"axes.{name}", first[name], "one of " + ", ".join(RUN_NAMES))
         if "." not in name and name != "repeat" and not re.search(rf"\b{re.escape(name)}\b", used):
             raise ArgumentError(f"axes.{name}", first[name], "a dotted key of the problem, such as scene.friction, "
                                                              "repeat, or a name that derived or exclude use")

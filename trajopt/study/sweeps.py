@@ -135,9 +135,9 @@ def record_run(store: Store, table: CaseTable, missing_cases: int, function: str
 def close_record(store: Store, run_id: str, state: str, counts: Mapping[str, int]) -> None:
     """Note how a run ended. A run that was killed stays "running" in its record."""
     file = store.path / "runs" / f"{run_id}.json"
-    entry = json.loads(file.read_text(encoding="utf-8"))
-    entry.update(state=state, ended=time.time(), counts=dict(counts))
     try:
+        entry = json.loads(file.read_text(encoding="utf-8"))
+        entry.update(state=state, ended=time.time(), counts=dict(counts))
         _write_record(store, run_id, entry)
     except Exception:  # a full disk: the reason is already on its way, and the record is not worth hiding it
         if state == "finished":

@@ -1,0 +1,194 @@
+"""Sweeps as a whole: equal tables everywhere, bad run functions, stops, and workers that die."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.study.crashes import ROOT, cases, digest, torment
+from tests.study.run_functions import cheap, mixed, noop, paced, poisoned
+from trajopt.errors import ArgumentError
+from trajopt.study.cases import Case
+from trajopt.study.drive import Progress
+from trajopt.study.engines import dask_local
+from trajopt.study.host import RunLoadError
+from trajopt.study.store import StoreError, open_store
+from trajopt.study.sweeps import sweep
+
+KINDS = ("raise", "exit", "hard exit", "segfault", "hang", "spin", "deaf", "memory", "print", "unserialisable",
+         "lambda", "kind")
+EXPECTED = {"raise": ("error", "RuntimeError"), "exit": ("error", "SystemExit"), "hard exit": ("crashed", "WorkerDied"),
+            "segfault": ("crashed", "WorkerDied"), "hang": ("timeout", "TimeLimit"), "spin": ("timeout", "TimeLimit"),
+            "deaf": ("timeout", "TimeLimit"), "memory": ("error", "MemoryError"), "print": ("done", None),
+            "unserialisable": ("error", "ArgumentError"), "lambda": ("error", "ArgumentError"),
+            "kind": ("error", "ResultKindError")}
+
+
+def test_the_same_table_whatever_the_workers(tmp_path: Path) -> None:
+    one = sweep(cases(300), mixed, executor=1, store=tmp_path / "one")
+    two = sweep(list(reversed(cases(300))), mixed, executor=2, store=tmp_path / "two")
+    assert one.counts() == {"done": 296, "error": 4}
+    assert digest(one) == digest(two)
+    with ThreadPoolExecutor(2) as threads:
+        assert digest(sweep(cases(300), mixed, executor=threads, store=tmp_path / "threads")) == digest(one)
+
+
+@pytest.mark.slow
+def test_the_same_table_on_dask(tmp_path: Path) -> None:
+    pytest.importorskip("distributed", reason="Dask distributed is not installed")
+    one = sweep(cases(300), mixed, executor=1, store=tmp_path / "one")
+    assert digest(sweep(cases(300), mixed, executor=dask_local(2), store=tmp_path / "dask")) == digest(one)
+
+
+@pytest.mark.slow
+def test_bad_cases_cost_their_own_row(tmp_path: Path) -> None:
+    many: list[dict[str, Any]] = [{"x": i, "kind": ""} for i in range(60)]
+    many += [{"x": 100 + i, "kind": kind} for i, kind in enumerate(KINDS)]
+    store = sweep(many, poisoned, executor=2, store=tmp_path / "store", time_limit=1.0, memory_limit=4_000_000_000)
+    frame = store.frame()
+    good = frame[frame["kind"] == ""]
+    assert (good["status"] == "done").all()
+    assert (good["square"] == good["x"] ** 2.0).all()
+    found = frame.set_index("kind").loc[list(KINDS)]
+    told = {kind: (row["status"], row["error"] if isinstance(row["error"], str) else None)
+            for kind, row in found.iterrows()}
+    assert told == EXPECTED
+    assert "string_at" in found.loc["segfault", "error_traceback"]
+    assert "on purpose" in found.loc["raise", "error_traceback"]
+    assert len(frame) == len(many)
+
+
+@pytest.mark.slow
+def test_a_case_that_kills_its_worker_is_found(tmp_path: Path) -> None:
+    many = [{"x": i, "kind": "kill worker" if i == 23 else ""} for i in range(60)]
+    store = sweep(many, poisoned, executor=2, store=tmp_path / "store")
+    frame = store.frame()
+    assert store.counts() == {"crashed": 1, "done": 59}
+    assert frame[frame["status"] == "crashed"]["x"].tolist() == [23]
+
+
+def test_rerunning_does_only_what_is_missing(tmp_path: Path) -> None:
+    store = sweep(cases(20), cheap, executor=1, store=tmp_path / "store")
+    parts = store.parts()
+    sweep(cases(20), cheap, executor=1, store=store)
+    assert store.parts() == parts
+    seen: list[Progress] = []
+    sweep(cases(25), cheap, executor=1, store=store, progress=seen.append)
+    assert seen[-1].total == seen[-1].finished == 5
+    assert len(store.frame()) == 25
+    assert [r["state"] for r in store.runs()] == ["finished"] * 3
+
+
+class Flag:
+    """A run function that fails until a file exists."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def __call__(self, case: Case) -> float:
+        if not self.file.exists():
+            raise FileNotFoundError(str(self.file))
+        return float(case["x"])
+
+
+def test_retry_failed(tmp_path: Path) -> None:
+    run, store = Flag(tmp_path / "flag"), tmp_path / "store"
+    assert sweep(cases(5), run, executor=1, store=store).counts() == {"error": 5}
+    run.file.touch()
+    assert sweep(cases(5), run, executor=1, store=store).counts() == {"error": 5}
+    assert sweep(cases(5), run, executor=1, store=store, retry_failed=True).counts() == {"done": 5}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_stopping_keeps_finished_cases(tmp_path: Path, number: int) -> None:
+    program = (f"import signal; signal.signal(signal.SIGTERM, signal.default_int_handler)\n"
+               f"from tests.study.crashes import cases; from tests.study.run_functions import paced\n"
+               f"from trajopt.study.sweeps import sweep\n"
+               f"sweep(cases(4000), paced, executor=2, store={str(tmp_path / 'store')!r})")
+    process = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    store = open_store(tmp_path / "store")
+    for _ in range(600):
+        if len(store.parts()) > 1:
+            break
+        time.sleep(0.05)
+    started = time.monotonic()
+    process.send_signal(number)
+    _, told = process.communicate(timeout=60)
+    assert time.monotonic() - started < 30
+    assert "KeyboardInterrupt" in told
+    assert 3 < len(store.finished()) < 4000
+    assert store.counts().keys() == {"done"}
+    assert store.runs()[-1]["state"] == "interrupted"
+    assert not list((store.path / "runs").glob("*.stop"))
+
+
+def test_two_sweeps_on_one_store(tmp_path: Path) -> None:
+    program = (f"from tests.study.crashes import cases; from tests.study.run_functions import paced\n"
+               f"from trajopt.study.sweeps import sweep\n"
+               f"sweep(cases(200), paced, executor=1, store={str(tmp_path / 'store')!r})")
+    both = [subprocess.Popen([sys.executable, "-c", program], cwd=ROOT) for _ in range(2)]
+    assert [p.wait(timeout=120) for p in both] == [0, 0]
+    store = open_store(tmp_path / "store", create=False)
+    assert digest(store) == digest(sweep(cases(200), paced, executor=2, store=tmp_path / "alone"))
+
+
+def test_full_disk_stops_with_a_message(tmp_path: Path) -> None:
+    """A limit on file sizes stands for a full disk: the worker's part cannot be written."""
+    store = sweep(cases(5), mixed, executor=1, store=tmp_path / "store")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, hard))
+    try:
+        with pytest.raises(StoreError, match="cannot write"):
+            sweep(cases(300), mixed, executor=1, store=store)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        signal.signal(signal.SIGXFSZ, before)
+    assert len(store.frame()) >= 5
+    assert not [p for p in (store.path / "temporary").iterdir() if p.suffix == ".parquet"]
+    assert sum(sweep(cases(300), mixed, executor=1, store=store).counts().values()) == 300
+
+
+@pytest.mark.slow
+def test_killed_at_random(tmp_path: Path) -> None:
+    """The short form of ``python -m tests.study.crashes``."""
+    outcome = torment(6, "processes", 300, 7, tmp_path)
+    assert outcome.faults == []
+    assert outcome.reads > 0
+
+
+def test_a_run_function_that_cannot_be_loaded(tmp_path: Path) -> None:
+    with pytest.raises(RunLoadError, match="nowhere"):
+        sweep(cases(3), _Broken(), executor=1, store=tmp_path / "store")
+
+
+class _Broken:
+    def __reduce__(self) -> Any:
+        return (__import__, ("nowhere",))
+
+    def __call__(self, case: Case) -> None: ...
+
+
+def test_lambdas_travel_by_value(tmp_path: Path) -> None:
+    pytest.importorskip("cloudpickle")
+    store = sweep(cases(4), lambda case: case["x"] + 0.5, executor=1, store=tmp_path / "store")
+    assert sorted(store.frame()["value"]) == [0.5, 1.5, 2.5, 3.5]
+
+
+def test_columns_and_bad_arguments(tmp_path: Path) -> None:
+    store = sweep({"x": np.arange(3)}, noop, executor=1, store=tmp_path / "store")
+    assert sorted(store.frame()["x"]) == [0, 1, 2]
+    assert store.counts() == {"done": 3}
+    with pytest.raises(ArgumentError, match="time_limit"):
+        sweep(cases(1), noop, store=store, time_limit=0.0)
+    with pytest.raises(ArgumentError, match="case_seed"):
+        sweep([{"case_seed": 1}], noop, store=store)
