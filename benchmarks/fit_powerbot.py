@@ -31,7 +31,7 @@ TARGETS = ("length", "unscaled_speed", "unscaled_acceleration", "unscaled_decele
 WEIGHT = 20.0  # one over 5 %, the aim
 SLIDING_WEIGHT = {1: 2.0, 2: 2.0, 4: 10.0, 5: 10.0}  # chosen: it binds only without the safety speed (4 and 5)
 RAMP_LENGTH, RAMP_HEIGHT = 4.29, 0.45  # m, thesis 004, section 4.4
-RAMP_END = 0.35  # m of level floor between the ramp's top and the goal; chosen: the axle distance
+RAMP_FOOT, RAMP_DIRECTION = (-44.63, -30.4), math.radians(-91.0)  # m, rad; chosen: the straightest stretch
 SAMPLES = 201
 
 
@@ -94,7 +94,7 @@ def fit(case: Case, starts: int, rng: np.random.Generator) -> Array:
         wider = values[-1] / case.printed[-1] - 1  # a wider bend than printed costs nothing
         miss[-1] = SLIDING_WEIGHT[case.number] * min(wider, 0.0)
         extra = [0.02 * turning, *(0.002 * x[-2:])]  # prefer plain paths among equal ones
-        if case.number == 4:  # the ramp at the end is straight
+        if case.number == 4:  # the last stretch follows the goal's heading
             end = path.position(np.linspace(path.end - 1.0, path.end, 11))[:, :2] - case.goal
             extra += list(0.5 * (end @ [-math.sin(case.headings[1]), math.cos(case.headings[1])]))
         return np.concatenate([miss, extra])
@@ -132,11 +132,8 @@ def toml(case: Case, x: Array) -> str:
         f"start_rate = {x[-2]:g}  # fitted", f"goal_rate = {x[-1]:g}  # fitted", "",
     ]
     if case.number == 4:
-        direction = case.headings[1]
-        run = math.sqrt(RAMP_LENGTH**2 - RAMP_HEIGHT**2)
-        foot = case.goal - (run + RAMP_END) * np.array([math.cos(direction), math.sin(direction)])
-        lines += ["[[ramps]]  # section 4.4; its place is drawn only: the top lies one axle distance before the goal",
-                  f"foot = [{foot[0]:.3f}, {foot[1]:.3f}]", f"direction = {direction:.6f}",
+        lines += ["[[ramps]]  # section 4.4; its place is drawn only: chosen, the straightest stretch",
+                  f"foot = [{RAMP_FOOT[0]}, {RAMP_FOOT[1]}]", f"direction = {RAMP_DIRECTION:.6f}",
                   f"length = {RAMP_LENGTH}", f"height = {RAMP_HEIGHT}", ""]
     lines += ["[limits]", 'variant = "thesis"', f"speed = {row['v_robot']}"]
     if row["v_safety"]:
@@ -154,9 +151,12 @@ def main() -> None:
     """Fit, print, and write the files with --write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--quick", action="store_true", help="few starts")
+    parser.add_argument("--only", type=int, choices=sorted(SLIDING_WEIGHT), help="one experiment")
     parser.add_argument("--write", action="store_true", help="write problems/powerbot/experiment_*.toml")
     arguments = parser.parse_args()
     for case in cases():
+        if arguments.only not in (None, case.number):
+            continue
         x = fit(case, 4 if arguments.quick else 70, np.random.default_rng(4))
         values, turning = measured(path_of(case, x), 2001)
         shown = ", ".join(f"{name} {value / print_ - 1:+.1%}"

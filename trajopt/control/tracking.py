@@ -3,9 +3,10 @@
 The law is that of Kanayama et al. (1990) in the form whose damping does not depend on speed (de Luca et al.,
 2001): with the error (ex, ey, eyaw) of the reference seen from the robot,
 
-    v = v_ref cos(eyaw) + g ex,   w = w_ref + c v_ref sinc(eyaw) ey + g eyaw,   g = 2 z sqrt(w_ref^2 + c v_ref^2)
+    v = v_ref cos(eyaw) + k ex,   w = w_ref + c v_ref sinc(eyaw) ey + g eyaw,   g = 2 z sqrt(w_ref^2 + c v_ref^2)
 
-and a floor on g, so that distance and heading are still corrected at the end, where the reference stands.
+and a floor on g, so that the heading is still corrected at the end, where the reference stands. The gain k along
+the path is low and constant: near the friction limit a stiff one locks the wheels when the robot comes late.
 """
 
 from __future__ import annotations
@@ -26,20 +27,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Tracker:
-    """``damping`` z (-), ``stiffness`` c (1/m^2), ``floor`` of the gain g (1/s), all chosen.
+    """``damping`` z (-), ``stiffness`` c (1/m^2), ``along`` (1/s) and ``floor`` of g (1/s), all chosen.
 
     ``wheel_speed`` (m/s) is where commands saturate; both wheels are then scaled, so that the arc is kept.
     ``settle`` (s) is how long the goal is still corrected after the reference has arrived.
     """
 
     damping: float = 0.8
-    stiffness: float = 6.0
+    stiffness: float = 2.0
+    along: float = 1.0
     floor: float = 0.8
     wheel_speed: float = 2.1
     settle: float = 3.0
 
     def __post_init__(self) -> None:
-        for name in ("damping", "stiffness", "wheel_speed"):
+        for name in ("damping", "stiffness", "along", "wheel_speed"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
                 raise ArgumentError(f"tracker.{name}", getattr(self, name), "a finite value > 0")
         for name in ("floor", "settle"):
@@ -56,7 +58,7 @@ class Tracker:
         turn = float((reference[2] - pose[2] + np.pi) % (2 * np.pi) - np.pi)
         v_ref, w_ref = speed
         gain = max(2 * self.damping * float(np.sqrt(w_ref**2 + self.stiffness * v_ref**2)), self.floor)
-        v = v_ref * np.cos(turn) + gain * ex
+        v = v_ref * np.cos(turn) + self.along * ex
         w = w_ref + self.stiffness * v_ref * float(np.sinc(turn / np.pi)) * ey + gain * turn
         left, right = v - w * width / 2, v + w * width / 2
         most = max(abs(left), abs(right))

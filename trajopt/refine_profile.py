@@ -1,0 +1,111 @@
+"""Following a given speed profile as closely as the limits allow (thesis 004, section 2.4).
+
+From below, the profile is one more bound and the fastest motion under it is the closest at every place: no
+feasible profile that stays below is faster anywhere. In the least-squares sense the motion may also run above
+the profile where that pays for being below elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.limits.limit import Limit
+from trajopt.limits.speed_bound import SpeedProfile
+from trajopt.optimize.ipopt import solve_program, stacked, total, variables
+from trajopt.paths.path import Path
+from trajopt.robots.platform import Platform
+from trajopt.timing.scaling import time_scale
+from trajopt.timing.stages import check, fine_rows, stages_of
+from trajopt.timing.trajectory import Trajectory
+from trajopt.world.terrain import Flat, Terrain
+
+Array = NDArray[np.float64]
+
+_CELLS = 400  # intervals of the least-squares program; chosen
+_TIGHTER = 1e-6  # share by which its rows are tightened, for the solver's own tolerance
+_FLOOR = 1e-8  # m^2/s^2, least s'^2 inside the path: no rest on the way
+_MOST_SLOWDOWN = 1.01  # of time; chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """The motion, and how far its speed is from the profile's over the path: root mean square and largest, m/s."""
+
+    trajectory: Trajectory
+    wanted: Array  # (N+1,) m/s at the trajectory's gridpoints
+
+    @property
+    def error(self) -> float:
+        steps = np.diff(self.trajectory.s)
+        square = (self.trajectory.sd - self.wanted) ** 2
+        return float(np.sqrt(np.sum((square[1:] + square[:-1]) / 2 * steps) / steps.sum()))
+
+    @property
+    def largest_error(self) -> float:
+        return float(np.abs(self.trajectory.sd - self.wanted).max())
+
+
+def follow(path: Path, profile: SpeedProfile, limits: Sequence[Limit], *, robot: Platform | None = None,
+           terrain: Terrain | None = None, start_speed: float = 0.0, end_speed: float = 0.0,
+           manner: Literal["below", "least_squares"] = "below") -> Followed:
+    """The motion closest to ``profile`` (s' over s) within ``limits``.
+
+    "below": nowhere above the profile; exact (it is a time-optimal problem). "least_squares": least integral of
+    (s'^2 - profile^2)^2 over the path, a convex program on the same rows solved by IPOPT, then checked and slowed
+    uniformly by what is left. Raises as ``time_scale``.
+    """
+    if manner not in ("below", "least_squares"):
+        raise ArgumentError("manner", manner, "below or least_squares")
+    if manner == "below":
+        found = time_scale(path, [*limits, profile], robot=robot, terrain=terrain, start_speed=start_speed,
+                           end_speed=end_speed)
+        return Followed(found, np.interp(found.s, profile.places, profile.speeds))
+    warm = time_scale(path, [*limits, profile], robot=robot, terrain=terrain, start_speed=start_speed,
+                      end_speed=end_speed)
+    return _least_squares(path, profile, tuple(limits), robot, Flat() if terrain is None else terrain, warm)
+
+
+def _least_squares(path: Path, profile: SpeedProfile, limits: tuple[Limit, ...], robot: Platform | None,
+                   terrain: Terrain, warm: Trajectory) -> Followed:
+    places = np.unique(np.concatenate([np.linspace(0.0, path.length, _CELLS + 1), np.asarray(profile.places)]))
+    places = places[(places >= 0) & (places <= path.length)]
+    u = np.unique(np.concatenate([path.locate(places), np.asarray(path.basis.knots)]))
+    u = u[np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])]
+    u[-1] = path.end
+    fine = fine_rows(path, u, limits, robot)
+    stages = stages_of(fine)
+    step, n = np.diff(fine.s), len(fine.s) - 1
+    first = np.interp(fine.s, warm.s, warm.sd**2)
+    wanted = np.interp(fine.s, profile.places, profile.speeds)
+    bound = np.full(n + 1, np.inf)
+    np.minimum.at(bound, np.repeat(np.arange(n + 1), 2)[1:-1], stages.sd2_max)
+    x = variables(n + 1)
+    rate = (x[1:] - x[:-1]) / (2 * step)
+    rows = []
+    for end, square in ((0, x[:-1]), (1, x[1:])):
+        a, b, c = (m[end::2] for m in (stages.a, stages.b, stages.c))
+        rows += [a[:, k] * rate + b[:, k] * square - c[:, k] for k in range(a.shape[1])]
+    weights = np.concatenate([[step[0]], step[:-1] + step[1:], [step[-1]]]) / 2
+    cost = total(weights * (x - wanted**2) ** 2)
+    lower, upper = np.full(n + 1, _FLOOR), (1 - _TIGHTER) * bound
+    lower[[0, -1]] = upper[[0, -1]] = first[[0, -1]]
+    constraints = stacked(rows)
+    count = constraints.shape[0]
+    result = solve_program(x, cost, constraints, start=np.clip(first, lower, upper), lower=lower, upper=upper,
+                           constraint_lower=np.full(count, -np.inf), constraint_upper=np.full(count, -_TIGHTER))
+    if not result.solved:
+        raise InfeasibleError("speed_profile", 0.0, f"IPOPT found no closest motion ({result.status})")
+    sd2 = np.maximum(result.x, 0.0)
+    factor = max(1.0, float(check(fine, sd2).factor.max()))
+    if np.sqrt(factor) > _MOST_SLOWDOWN:
+        raise InfeasibleError("speed_profile", 0.0, f"between gridpoints it would have to slow by {factor**0.5:.3g}")
+    sd2 = sd2 / factor
+    found = Trajectory(path, limits, robot, terrain, fine.u, fine.s, np.sqrt(sd2), np.diff(sd2) / (2 * step),
+                       "least_squares", float(np.sqrt(factor)))
+    return Followed(found, wanted)
