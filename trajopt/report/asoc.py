@@ -1,0 +1,95 @@
+"""Figures of thesis 001 from our numbers: isotropy (8, 9, 11, 13) and tracking (29-31), and the Pareto front."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from trajopt.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, new_figure
+
+Array = NDArray[np.float64]
+
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK)
+
+
+def curve_figure(x: Array, y: Array, printed: Mapping[float, float], labels: tuple[str, str, str]) -> Figure:
+    """One curve of ours (x, y) with values read from the thesis; ``labels``: title, x, y (Figures 9, 11)."""
+    figure = new_figure(3.2, 5.2)
+    axes = figure.add_subplot()
+    axes.plot(x, y, color=BLUE, label="quadrature")
+    axes.plot(list(printed), list(printed.values()), "o", color=VERMILION, label="thesis's figure")
+    axes.set_title(labels[0])
+    axes.set_xlabel(labels[1])
+    axes.set_ylabel(labels[2])
+    axes.set_ylim(0, 1.05)
+    axes.legend()
+    return figure
+
+
+def map_figure(x: Array, y: Array, values: Array, labels: tuple[str, str, str],
+               ridge: tuple[Array, Array] | None = None) -> Figure:
+    """Contours of ``values`` (len(y), len(x)); ``ridge``: a line to compare with (Figures 8, 13)."""
+    figure = new_figure(3.8, 5.4)
+    axes = figure.add_subplot()
+    lines = axes.contourf(x, y, values, levels=np.linspace(0, 1, 21), cmap="viridis")
+    figure.colorbar(lines, ax=axes, label="mean isotropy")
+    if ridge is not None:
+        axes.plot(*ridge, color="white", linestyle="--", label="2 / cos(tilt)")
+        axes.legend(labelcolor="white")
+        axes.set_xlim(x[0], x[-1])
+        axes.set_ylim(y[0], y[-1])
+    axes.set_title(labels[0])
+    axes.set_xlabel(labels[1])
+    axes.set_ylabel(labels[2])
+    axes.grid(visible=False)
+    return figure
+
+
+def tracks_figure(corners: Array, tracks: Sequence[tuple[str, Array]], title: str) -> Figure:
+    """Paths from above: ``tracks`` are (label, (n, 2) m) beside the commanded corners (Figures 29, 31)."""
+    figure = new_figure(4.6, 6.0)
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    axes.plot(*corners.T, color=GREY, linestyle="--", label="commanded")
+    for colour, (label, track) in zip(COLOURS * len(tracks), tracks, strict=False):
+        axes.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.0, label=label)
+    axes.set_title(title)
+    axes.set_xlabel("x, m")
+    axes.set_ylabel("y, m")
+    figure.legend(loc="outside right upper")
+    return figure
+
+
+def speed_figure(series: Sequence[tuple[str, Array, Array]], commanded: float, title: str) -> Figure:
+    """Speeds (label, times s, m/s) over time beside the commanded one and 48 % of it (Figure 30)."""
+    figure = new_figure(3.0)
+    axes = figure.add_subplot()
+    for colour, (label, times, speed) in zip(COLOURS * len(series), series, strict=False):
+        axes.plot(times, speed, color=colour, linewidth=1.0, label=label)
+    axes.axhline(commanded, color=GREY, linestyle="--", linewidth=0.8)
+    axes.axhline(0.48 * commanded, color=GREY, linestyle=":", linewidth=0.8, label="48 %, thesis's least")
+    axes.set_title(title)
+    axes.set_xlabel("time, s")
+    axes.set_ylabel("speed, m/s")
+    axes.set_ylim(bottom=0)
+    figure.legend(loc="outside right upper")
+    return figure
+
+
+def front_figure(terms: Array, names: Sequence[str], best: Array) -> Figure:
+    """Pareto front: each term (p, m, shares of its peak) against range; ``best`` (m,) the optimum of J."""
+    figure = new_figure(2.8)
+    axis = names.index("d_max")
+    others = [k for k in range(len(names)) if k != axis]
+    for place, k in enumerate(others):
+        axes = figure.add_subplot(1, len(others), place + 1)
+        axes.plot(terms[:, axis], terms[:, k], ".", color=BLUE, markersize=3)
+        axes.plot(best[axis], best[k], "*", color=VERMILION, markersize=9)
+        axes.set_title(names[k])
+        axes.set_xlabel("d_max / best")
+        if place == 0:
+            axes.set_ylabel("share of best")
+    return figure
