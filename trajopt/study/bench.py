@@ -23,7 +23,7 @@ from trajopt.errors import ArgumentError
 from trajopt.optimize.base import FEASIBLE, Budget, Optimizer, OptimizeResult
 from trajopt.optimize.plugins import optimizers_of_file
 from trajopt.optimize.search import minimize, optimizer_named
-from trajopt.study.bench_problems import BenchProblem, bench_problem, more_wild_names
+from trajopt.study.bench_problems import BenchProblem, bench_problem, more_wild_names, objective_named
 from trajopt.study.cases import Case
 from trajopt.study.drive import Progress
 from trajopt.study.store import Store
@@ -55,7 +55,7 @@ class BenchPlan:
         makers = {name: named_optimizer(name, self.plugins) for name in self.optimizers}
         found = []
         for problem in self.problems:
-            objective = bench_problem(problem, self.plugins, self.problem_root).objective
+            objective, _ = objective_named(problem, self.plugins, self.problem_root)
             for name, method in makers.items():
                 if not suits(method, objective):
                     continue

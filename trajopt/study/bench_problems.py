@@ -46,10 +46,15 @@ class BenchProblem:
 
 
 def bench_problem(name: str, plugins: tuple[str, ...] = (), root: str = "problems") -> BenchProblem:
-    """The problem called ``name``. ``root`` is the folder with problem files.
+    """The problem called ``name`` with its reference and best known cost; evaluates the objective at random points.
 
     Raises ArgumentError for an unknown name, MissingDependencyError where a package that ships it is missing.
     """
+    return _referenced(name, *objective_named(name, plugins, root))
+
+
+def objective_named(name: str, plugins: tuple[str, ...] = (), root: str = "problems") -> tuple[Objective, Array]:
+    """Objective and bounds (d, 2) of the problem called ``name``; ``root`` is the folder with problem files."""
     family, _, rest = name.partition("/")
     makers: dict[str, Callable[[str], tuple[Objective, Array]]] = {
         "smdw": lambda text: _smdw(text, root), "random-smdw": lambda text: _random_smdw(text, root),
@@ -57,10 +62,11 @@ def bench_problem(name: str, plugins: tuple[str, ...] = (), root: str = "problem
     for file in plugins:
         offered = mapping_of_file(file, "PROBLEMS")
         if name in offered:
-            return _referenced(name, *offered[name]())
+            objective, bounds = offered[name]()
+            return objective, np.asarray(bounds, dtype=np.float64)
     if family not in makers:
         raise ArgumentError("problem", name, "a name that starts with " + ", ".join(f"{m}/" for m in makers))
-    return _referenced(name, *makers[family](rest))
+    return makers[family](rest)
 
 
 def _referenced(name: str, objective: Objective, bounds: Array) -> BenchProblem:
