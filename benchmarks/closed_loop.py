@@ -105,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     publish(f"closed_loop_{given.engine}" + ("_quick" if given.quick else ""), [table],
             packages=("numpy", "mujoco", "pybullet"),
             notes=["Bounds: 10 mm, 1 deg, 0.1 rad with measurement noise and open loop; 5 mm, 0.5 deg, 0.06 rad "
-                   "without noise. Phase of open loop is that of a wheel servo, which does not know the pose. Brackets: "
+                   "without noise. Phase of open loop is that of a wheel servo that does not know the pose. Brackets: "
                    "Wilson, 95 %."])
 
 
