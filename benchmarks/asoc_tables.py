@@ -155,9 +155,10 @@ def table_5() -> ResultTable:
             rows.append((soil, model.value, f"{width:.3f}", f"{fit:.4f}", f"{100 * (fit / width - 1):+.1f} %",
                          f"{TABLE_6[soil]:.1f}", f"{gain:.1f}",
                          " ".join(f"{v:.3f}" for v in (best[0], best[1], best[0] + best[2], best[3])), f"{total:.4f}"))
-    return ResultTable("Tables V, VI: wheel width and gain of d_max at the printed other sizes; optimum of J on our "
-                       "design space", ("soil", "reading", "printed width, m", "width, m", "difference",
-                                        "printed gain, %", "gain, %", "optimum offset split radius width, m", "J"), rows)
+    return ResultTable("Tables V, VI: wheel width and gain of d_max at the printed other sizes; optimum of J on "
+                       "our design space", ("soil", "reading", "printed width, m", "width, m", "difference",
+                                        "printed gain, %", "gain, %",
+                                             "optimum offset split radius width, m", "J"), rows)
 
 
 def table_4() -> ResultTable:

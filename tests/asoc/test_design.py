@@ -156,8 +156,8 @@ def test_every_optimizer_ends_at_the_same_design_quality(name: str, design) -> N
     try:
         found = minimize(design, design.bounds, optimizer=name, seed=1, budget=Budget(evaluations=6000))
     except ArgumentError as refusal:
-        assert refusal.argument == "optimizer"
-        assert name not in CONSTRAINED
+        if refusal.argument != "optimizer" or name in CONSTRAINED:
+            raise
         return
     assert found.violation <= 1e-9
     share = 0.04 if name in UNDAMPED else 0.01

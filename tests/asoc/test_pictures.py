@@ -36,7 +36,7 @@ def test_wrong_shapes_are_refused() -> None:
 def test_figures_hold_what_they_are_given() -> None:
     x = np.linspace(1, 2, 5)
     assert len(curve_figure(x, x / 2, {1.0: 0.5}, ("t", "x", "y")).axes[0].lines) == 2
-    assert map_figure(x, x, np.full((5, 5), 0.5), ("t", "x", "y"), (x, x)).axes[0].get_title("left") == "t"
+    assert map_figure(x, x, np.full((5, 5), 0.5), ("t", "x", "y"), (x, x)).axes[0].get_title() == "t"
     assert len(tracks_figure(np.zeros((2, 2)), [("a", np.zeros((3, 2)))], "t").axes[0].lines) == 2
     assert len(speed_figure([("a", x, x)], 1.5, "t").axes[0].lines) == 3
     assert len(front_figure(np.ones((4, 3)), ["K", "d_max", "S"], np.ones(3)).axes) == 2
