@@ -87,7 +87,8 @@ def test_one_iteration_is_the_documented_update() -> None:
         better = cost < own_cost
         own[better], own_cost[better] = x[better], cost[better]
         r = rng.random((2, 5, 3))
-        v = options.inertia * v + options.cognitive * r[0] * (own - x) + options.social * r[1] * (own[np.argmin(own_cost)] - x)
+        leader = own[np.argmin(own_cost)]
+        v = options.inertia * v + options.cognitive * r[0] * (own - x) + options.social * r[1] * (leader - x)
         x = x + v
         np.testing.assert_allclose(swarm.x, x, rtol=1e-13, atol=1e-13)
         x = swarm.x.copy()

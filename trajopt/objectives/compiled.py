@@ -53,7 +53,7 @@ def _kernel(node, rate, g0, g1, g2, r0, r1, r2, weights, width, inverse, forward
     """Fill ``out`` (3 + 4, n) with final x, y, yaw and the wheel travel of n candidates (four wheels)."""
     steps, n = g0.shape[0], x.shape[1]
     c, s, ang = np.empty(n), np.empty(n), np.empty(n)
-    dev, dev_c, dev_s = np.zeros(n), np.ones(n), np.zeros(n)
+    dev_c, dev_s = np.ones(n), np.zeros(n)
     w0, w1, w2, w3 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     px, py = np.empty(n), np.empty(n)
     sum_x, sum_y, sum_t = np.zeros(n), np.zeros(n), np.zeros(n)

@@ -192,13 +192,12 @@ class Swarm:
 
     def _move(self, leader: Array) -> None:
         rules, x, v = self.rules, self.x, self.v
-        r = self.rng.random(self._pulls.shape)
+        r = np.asarray(self.rng.random(self._pulls.shape))
         low, high = self._low, self._high
         if self._kernel is not None and leader.ndim == 1:
-            outside = self._kernel.move(x, v, self.own, leader, r, self._inertia(), rules.cognitive, rules.social,
-                                        low, high, self._limit)
-            if not outside:
-                return
+            if not self._kernel.move(x, v, self.own, leader, r, self._inertia(), rules.cognitive, rules.social,
+                                     low, high, self._limit):
+                return  # no coordinate lies outside
         else:
             self._move_readably(leader, r)
         if rules.boundary in ("reset", "reflect", "absorb"):

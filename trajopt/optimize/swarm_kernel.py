@@ -30,12 +30,9 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
     best, feasible = 0, own_violation[0] <= FEASIBLE
     for i in range(1, n):
         inside = own_violation[i] <= FEASIBLE
-        if inside and not feasible:
-            best, feasible = i, True
-        elif inside and own_cost[i] < own_cost[best]:
-            best = i
-        elif not feasible and own_violation[i] < own_violation[best]:
-            best = i
+        if (inside and not feasible) or (inside and own_cost[i] < own_cost[best]) or (
+                not feasible and own_violation[i] < own_violation[best]):
+            best, feasible = i, inside or feasible
     return best
 
 

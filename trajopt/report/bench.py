@@ -85,7 +85,8 @@ def answers(tables: BenchTables) -> list[str]:
                for name in tables.optimizers if any(name in found for found in shares.values())}
     anywhere = [n for n in overall if all(n in found for found in shares.values())]
     general = max(anywhere, key=lambda n: overall[n]) if anywhere else ""
-    lines.append("**Recommendation**: " + ("take lattice where critical wheel angles are affine or nearly so; " if exact else "")
+    first = "take lattice where critical wheel angles are affine or nearly so; " if exact else ""
+    lines.append("**Recommendation**: " + first
                  + (f"where nothing is known of the objective, {general} solved most over all families "
                     f"({overall[general]:.0%})." if general else "no optimizer ran on every family."))
     return lines
@@ -134,7 +135,8 @@ def _failures(tables: BenchTables) -> list[str]:
     if not tables.failed:
         return ["None."]
     rows = [(str(r["problem"]), str(r["optimizer"]), str(r["seed"]), str(r["status"]), str(r.get("failures") or ""),
-             str(r.get("first_failure") or r.get("error_message") or "").replace("|", "/")[:160]) for r in tables.failed]
+             str(r.get("first_failure") or r.get("error_message") or "").replace("|", "/")[:160])
+            for r in tables.failed]
     shown = rows[:40]
     text = _markdown(("problem", "optimizer", "seed", "status", "failed evaluations", "first reason"), shown)
     return text if len(rows) == len(shown) else [*text, "", f"and {len(rows) - len(shown)} more (searches.csv)"]

@@ -110,7 +110,8 @@ def load_bench(path: str | Path, plugins: Iterable[str | Path] = ()) -> BenchPla
         if key in data and (isinstance(data[key], bool) or not isinstance(data[key], (int, float)) or data[key] <= 0):
             raise ArgumentError(f"{path}: {key}", data[key], "a number > 0")
     files = [str(Path(p).resolve()) for p in (*data.pop("plugins", []), *plugins)]
-    problems = [name for text in data.pop("problems") for name in (more_wild_names() if text == "more-wild/*" else [text])]
+    asked = data.pop("problems")
+    problems = [name for text in asked for name in (more_wild_names() if text == "more-wild/*" else [text])]
     for file in files:
         from trajopt.optimize.plugins import mapping_of_file
 

@@ -45,7 +45,8 @@ def run(bench_file: BenchFile, store: StoreOption = None, plugin: Plugins = None
     total = len(plan.cases())
     console.print(f"{plan.title}: {len(plan.problems)} problems, {len(plan.optimizers)} optimizers, {total} searches; "
                   f"rows in {place}")
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+               TimeRemainingColumn())
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("searches", total=None)
 

@@ -151,7 +151,7 @@ def _classical(text: str) -> tuple[Objective, Array]:
     try:
         from pymoo.problems import get_problem
     except ImportError:
-        raise MissingDependencyError("pymoo", "peers", "the classical functions") from None
+        raise MissingDependencyError("pymoo", "optimizers", "the classical functions") from None
     shipped = get_problem(name, n_var=int(dimension))
     low, high = np.asarray(shipped.xl, dtype=np.float64), np.asarray(shipped.xu, dtype=np.float64)
     # A fifth is cut off on one side, or the optimum is the middle, where DIRECT and local methods start. Chosen.
@@ -168,8 +168,8 @@ def _more_wild_set() -> dict[str, Any]:
     try:
         from optimagic.benchmarking.get_benchmark_problems import get_benchmark_problems
     except ImportError:
-        raise MissingDependencyError("optimagic", "peers", "the Moré-Wild problems") from None
-    found: dict[str, Any] = get_benchmark_problems("more_wild")
+        raise MissingDependencyError("optimagic", "optimizers", "the Moré-Wild problems") from None
+    found: dict[str, Any] = get_benchmark_problems("more_wild")  # type: ignore[no-untyped-call]
     return found
 
 

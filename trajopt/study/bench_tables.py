@@ -140,7 +140,8 @@ class BenchTables:
                 rows = [r for r in self.done if r["problem"] == problem and r["optimizer"] == optimizer]
                 if rows:
                     times = [float(self._row_times(r, "evaluations", [share])[0]) for r in rows]
-                    found.append((problem, optimizer, expected_running_time(times, [float(r["nfev"]) for r in rows], rng)))
+                    used = [float(r["nfev"]) for r in rows]
+                    found.append((problem, optimizer, expected_running_time(times, used, rng)))
         return found
 
     def compared(self, first: str, second: str, start: str = "classical/") -> list[tuple[str, float, float, float]]:

@@ -49,7 +49,7 @@ class PySwarms:
         try:
             from pyswarms.single.global_best import GlobalBestPSO
         except ImportError:
-            raise MissingDependencyError("pyswarms", "peers", "the optimizer pyswarms") from None
+            raise MissingDependencyError("pyswarms", "dev", "the optimizer pyswarms") from None
         # pyswarms 1.3 documentation, "Basic Optimization"; Clerc and Kennedy 2002 for the equal ones
         options = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298} if self.equal else {"c1": 0.5, "c2": 0.3, "w": 0.9}
         before = np.random.get_state()  # noqa: NPY002 - the only generator pyswarms knows
@@ -85,9 +85,9 @@ class Pymoo:
             from pymoo.core.problem import Problem
             from pymoo.optimize import minimize
         except ImportError:
-            raise MissingDependencyError("pymoo", "peers", "the optimizer pymoo-pso") from None
+            raise MissingDependencyError("pymoo", "optimizers", "the optimizer pymoo-pso") from None
 
-        class Asked(Problem):  # type: ignore[misc] - pymoo's interface is a base class
+        class Asked(Problem):  # type: ignore[misc]  # pymoo's interface is a base class
             def _evaluate(self, x: Array, out: dict[str, Any], *_: Any, **__: Any) -> None:
                 out["F"] = np.minimum(run.evaluate(x).cost, _LARGE)[:, None]
 
