@@ -90,6 +90,40 @@ def test_no_turn_between_start_and_goal_is_explained(scenario):
         minimize(objective, objective.bounds, optimizer="lattice")
 
 
+def test_lattice_points_are_exact_with_a_free_heading(problem):
+    """The heading is held at its default: wheel angles are not affine in it."""
+    objective = terminal_objective(with_free(problem, "p1", "p2", "heading"))
+    part = objective.affine_part()
+    points, _ = lattice_points(part, objective.bounds[part.variables])
+    candidates = np.tile(part.base, (len(points), 1))
+    candidates[:, part.variables] = points
+    assert len(points)
+    assert max(objective.score(x).cost[0] for x in candidates) < 1e-9
+
+
+@pytest.mark.parametrize("optimizer", ["lattice", "ipopt"])
+@pytest.mark.parametrize("free", [("heading",), ("p2", "heading")])
+def test_without_a_turn_a_free_heading_still_sets_the_wheels(scenario, optimizer, free):
+    straight = with_free(scenario.replace({"goal.pose": [2.2, 0.76, 0.0]}), *free)
+    objective = terminal_objective(straight)
+    assert minimize(objective, objective.bounds, optimizer=optimizer).fun <= 1e-9
+
+
+def test_a_huge_space_is_no_trouble(scenario):
+    huge = terminal_objective(scenario.replace(space={"x": [-1e5, 1e5], "y": [-1e5, 1e5]}))
+    result = minimize(huge, huge.bounds, optimizer="lattice", budget=Budget(evaluations=500))
+    assert result.fun <= 1e-6  # positions of 100 km have 1e-11 m of rounding
+    assert result.nfev <= 500
+
+
+@pytest.mark.parametrize("evaluations", [1, 40])
+def test_lattice_keeps_a_small_budget(evaluations):
+    objective = through_actuators("scenario_1_lateral")
+    result = minimize(objective, objective.bounds, optimizer="lattice", budget=Budget(evaluations=evaluations))
+    assert result.nfev <= evaluations
+    assert np.isfinite(result.fun)
+
+
 def test_all_four_wheels_cannot_be_had(scenario):
     every = scenario.replace({"goal.critical": ["front-left", "front-right", "rear-left", "rear-right"]})
     objective = terminal_objective(every)

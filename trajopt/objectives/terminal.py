@@ -57,6 +57,9 @@ class TerminalObjective:
     steps: int = SEARCH_STEPS
     kinematics: Kinematics | None = None  # None: the robot's own; given only to compare conventions
 
+    def __post_init__(self) -> None:
+        step_grid(self.basis, self.steps)  # raises for steps that do not fit, even where no grid is used later
+
     @property
     def basis(self) -> SplineBasis:
         return uniform_basis(4)
@@ -269,10 +272,11 @@ class TerminalObjective:
         return part.matrix, part.offset
 
     def affine_part(self) -> AffinePart:
-        """The affine residuals of p1 and p2 with ideal actuators, everything else at its default."""
-        variables = np.array([i for i, name in enumerate(self.names) if name[:4] in ("p1.x", "p1.y", "p2.x", "p2.y")])
-        if variables.size == 0:
-            raise ArgumentError("spline.free", list(self.problem.spline.free), "p1 or p2 among the free values")
+        """The affine residuals of p1 and p2 with ideal actuators, everything else at its default.
+
+        Without p1 and p2 among the free values its matrix has no columns.
+        """
+        variables = np.array([i for i, name in enumerate(self.names) if name.endswith(("x_m", "y_m"))], dtype=np.intp)
         probes = np.tile(self.default[:, None], variables.size + 1)
         probes[variables, 0] = 0.0
         probes[variables[:, None], np.arange(1, variables.size + 1)] = np.eye(variables.size)

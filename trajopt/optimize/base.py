@@ -19,7 +19,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike, NDArray
 
-from trajopt.errors import ArgumentError
+from trajopt.errors import ArgumentError, as_numbers
 from trajopt.objectives.base import Capability, Evaluation, Objective
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ class Status(Enum):
     SECONDS = "the budget of seconds is used up; raise Budget.seconds to search longer"
     INFEASIBLE = "no feasible candidate was found; widen the bounds or free more variables"
     FAILED = "the objective gave no finite cost anywhere it was asked; check the objective at x0"
-    NO_EXACT = "no exact solution lies inside the bounds; the best feasible one is returned; free more variables"
+    NO_EXACT = "no exact solution was found inside the bounds; the best feasible one is returned; free more variables"
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,13 @@ class Budget:
     target: float | None = None
 
     def __post_init__(self) -> None:
-        if self.evaluations is not None and self.evaluations < 1:
+        whole = isinstance(self.evaluations, (int, np.integer)) and not isinstance(self.evaluations, bool)
+        if self.evaluations is not None and not (whole and self.evaluations >= 1):
             raise ArgumentError("budget.evaluations", self.evaluations, "a whole number >= 1, or None")
-        if self.seconds is not None and not self.seconds > 0:
-            raise ArgumentError("budget.seconds", self.seconds, "a time > 0 s, or None")
+        if self.seconds is not None and not (_is_real(self.seconds) and 0 < self.seconds < np.inf):
+            raise ArgumentError("budget.seconds", self.seconds, "a finite time > 0 s, or None")
+        if self.target is not None and not (_is_real(self.target) and not np.isnan(self.target)):
+            raise ArgumentError("budget.target", self.target, "a cost, or None")
         if self.evaluations is None and self.seconds is None:
             raise ArgumentError("budget", "unlimited", "a limit on evaluations or on seconds")
 
@@ -188,7 +191,7 @@ class Run:
                                   np.concatenate([p.violation for p in parts]))
             return self._failed(np.full(1, np.inf), np.full(1, np.inf), np.ones(1, bool),
                                 f"{type(error).__name__}: {error}")
-        if math.isfinite(np.add.reduce(cost) + np.add.reduce(violation)):  # then each of them is; the usual case, and quick
+        if math.isfinite(np.add.reduce(cost) + np.add.reduce(violation)):  # then each is; the usual case, quick
             return Evaluation(cost, violation)
         bad = ~(np.isfinite(cost) & np.isfinite(violation))
         if bad.any():
@@ -217,10 +220,13 @@ class Run:
             self.on_progress(self.nfev, self.best_cost)
 
     def spend(self, evaluations: int) -> None:
-        """Count work on the objective that does not go through ``evaluate`` (residuals, derivatives)."""
-        self.nfev += evaluations
-        if self.remaining() <= 0:
+        """Count work on the objective that does not go through ``evaluate`` (residuals), before it is done.
+
+        Ends the search where the budget does not hold it.
+        """
+        if evaluations > self.remaining():
             self.stop(Status.EVALUATIONS)
+        self.nfev += evaluations
         if self.budget.seconds is not None and self.elapsed >= self.budget.seconds:
             self.stop(Status.SECONDS)
 
@@ -296,7 +302,7 @@ def best_index(cost: Array, violation: Array) -> int:
 
 def checked_bounds(bounds: ArrayLike, dimension: int | None = None) -> Array:
     """(d, 2) array of finite bounds, lower < upper. Raises ArgumentError otherwise."""
-    array = np.asarray(bounds, dtype=np.float64)
+    array = as_numbers("bounds", bounds, "a lower and an upper bound a variable: numbers of shape (d, 2)")
     if array.ndim != 2 or array.shape[1] != 2 or array.shape[0] < 1:
         raise ArgumentError("bounds", array.shape, "shape (d, 2): a lower and an upper bound a variable")
     if not np.all(np.isfinite(array)) or np.any(array[:, 0] >= array[:, 1]):
@@ -306,11 +312,15 @@ def checked_bounds(bounds: ArrayLike, dimension: int | None = None) -> Array:
     return array
 
 
+def _is_real(value: object) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
 def checked_x0(x0: ArrayLike | None, bounds: Array) -> Array | None:
     """Starting point (d,) inside the bounds, or None. Raises ArgumentError for anything else."""
     if x0 is None:
         return None
-    point = np.asarray(x0, dtype=np.float64)
+    point = as_numbers("x0", x0, f"{len(bounds)} finite numbers")
     if point.shape != (len(bounds),) or not np.all(np.isfinite(point)):
         raise ArgumentError("x0", point.tolist(), f"{len(bounds)} finite numbers")
     if np.any(point < bounds[:, 0]) or np.any(point > bounds[:, 1]):

@@ -26,7 +26,7 @@ from trajopt.objectives.base import (
     SymbolicProblem,
 )
 from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
-from trajopt.optimize.lattice import EXACT, lattice_points
+from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
 from trajopt.optimize.newton import solve_residuals
 
 Array = NDArray[np.float64]
@@ -89,7 +89,9 @@ class Ipopt:
         if self.lattice_starts and hasattr(run.objective, "affine_part"):
             objective = cast(LatticeObjective, run.objective)
             part = objective.affine_part()
-            points, _ = lattice_points(part, run.bounds[part.variables])
+            points = np.zeros((0, len(part.variables)))
+            if has_influence(part):
+                points, _ = lattice_points(part, run.bounds[part.variables])
             candidates = np.tile(part.base, (len(points), 1))
             candidates[:, part.variables] = points
             if len(points):
@@ -141,6 +143,7 @@ class _Program:
         """The decision variables (d,) where IPOPT ended from ``start`` (d,)."""
         slacks = self.objective.slacks_at(start)
         d = len(start)
+        self.watch.seen = 0
         solution = self.solver(
             x0=np.concatenate([start, slacks]), p=self.objective.parameters_at(start),
             lbx=np.concatenate([self.run.bounds[:, 0], np.zeros(self.slacks)]),
@@ -148,14 +151,15 @@ class _Program:
             lbg=self.lower, ubg=self.upper)
         stats = self.solver.stats()
         self.run.nit += int(stats["iter_count"])
+        # IPOPT's own calls beyond the one an iterate that the watch has counted: line searches.
+        self.run.nfev += max(0, int(stats.get("n_call_nlp_f", 0)) - self.watch.seen)
+        self.run.ngev += int(stats.get("n_call_nlp_grad_f", 0))
         if self.watch.stopped is not None:
             self.run.stop(self.watch.stopped)
         x = np.clip(np.asarray(solution["x"]).ravel()[:d], self.run.bounds[:, 0], self.run.bounds[:, 1])
         if not np.all(np.isfinite(x)):
             return start
         self.run.evaluate(x[None])
-        self.run.ngev += int(stats.get("n_call_nlp_grad_f", 0))
-        self.run.spend(int(stats.get("n_call_nlp_f", 0)))
         return np.asarray(x)
 
 
@@ -176,6 +180,7 @@ def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
         def __init__(self) -> None:
             ca.Callback.__init__(self)
             self.stopped: Status | None = None
+            self.seen = 0  # iterates of this start
             self.construct("watch", {})
 
         def get_n_in(self) -> int:
@@ -191,6 +196,8 @@ def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
         def eval(self, arguments: Any) -> list[int]:
             x = np.asarray(arguments[0]).ravel()[:d]
             try:
+                run.spend(1)  # IPOPT's own call
+                self.seen += 1
                 run.evaluate(np.clip(x, run.bounds[:, 0], run.bounds[:, 1])[None])
             except Exception as stop:  # exceptions cannot cross CasADi: remember, and ask IPOPT to end
                 self.stopped = getattr(stop, "status", Status.FAILED)

@@ -17,13 +17,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, LatticeObjective, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds
+from trajopt.optimize.base import (
+    Budget,
+    OptimizeResult,
+    Progress,
+    Run,
+    Status,
+    best_index,
+    checked_bounds,
+    checked_x0,
+)
 from trajopt.optimize.newton import solve_residuals
 
 Array = NDArray[np.float64]
 
 EXACT = 1e-9  # cost, or wheel error in rad, up to which a solution counts as exact
 _NO_INFLUENCE = 1e-6  # rad/m; a control point that turns no wheel by more has no influence (wheels turn 1/R)
+_MOST_TURNS = 200  # of one wheel that are looked at, chosen: 40,000 combinations of two wheels
+_BATCH = 100  # candidates evaluated at once, chosen
 
 
 @dataclass(frozen=True)
@@ -40,58 +51,74 @@ class Lattice:
 
     rounds: int = 5  # chosen
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,  # noqa: ARG002
+    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
                  rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Solve. ``x0`` is not used: the method needs no start. ``rng`` draws base points for later rounds.
+        """Solve. ``x0`` is checked but not used: the method needs no start. ``rng`` draws base points for later rounds.
 
-        Raises ArgumentError for an objective without an affine part.
+        Raises ArgumentError for an objective without an affine part, or one whose wheel angles no free
+        variable changes.
         """
         if not hasattr(objective, "affine_part"):
             raise ArgumentError("optimizer", self.name, "an objective with affine wheel angles (the terminal "
                                                         "objective); take pso or differential-evolution here")
         box = checked_bounds(bounds, objective.dimension)
+        checked_x0(x0, box)
         run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self._search(run, cast(LatticeObjective, objective), rng))
 
     def _search(self, run: Run, objective: LatticeObjective, rng: Generator) -> tuple[Status, str]:
         part = objective.affine_part()
+        if Capability.AFFINE not in objective.provides and not has_influence(part):
+            return self._through_actuators(run, objective, part, part.base[None], rng)
         box = run.bounds[part.variables]
         points, turns = lattice_points(part, box)
-        candidates = np.tile(part.base, (len(points), 1))
-        candidates[:, part.variables] = points
         if len(points) == 0:
             return self._nearest(run, objective, part, box)
-        order = np.argsort(objective.effort(candidates), kind="stable")
-        candidates, turns = candidates[order], turns[order]
-        if Capability.AFFINE in objective.provides:
-            run.nit = 1
-            run.evaluate(candidates)
-            run.propose(candidates[0])
-            misses = candidates[:, part.variables] @ part.matrix.T + part.offset - part.period * turns
-            if np.max(np.abs(misses[0])) <= EXACT:
-                return Status.CONVERGED, f"{len(points)} exact solutions inside the bounds, the one with the " \
-                                         f"least effort taken"
+        every = np.tile(part.base, (len(points), 1))
+        every[:, part.variables] = points
+        candidates = every[: run.remaining()]
+        cost = _evaluated(run, candidates)
+        # Where the cost is no deviation (duration), it ranks exact solutions itself.
+        order = np.argsort(cost if objective.constrained else objective.effort(candidates), kind="stable")
+        candidates, turns = candidates[order], turns[: len(candidates)][order]
+        if Capability.AFFINE not in objective.provides:
+            return self._through_actuators(run, objective, part, candidates, rng, turns)
+        run.nit = 1
+        run.propose(candidates[0])
+        misses = candidates[:, part.variables] @ part.matrix.T + part.offset - part.period * turns
+        if np.max(np.abs(misses[0])) > EXACT:
             return Status.NO_EXACT, "the critical wheels over-determine the control points"
-        return self._through_actuators(run, objective, part, candidates, turns, rng)
+        compared = "" if len(candidates) == len(every) else f", {len(candidates)} of them compared"
+        taken = "the fastest" if objective.constrained else "the one with the least effort"
+        return Status.CONVERGED, f"{len(every)} exact solutions found inside the bounds{compared}, {taken} taken"
 
     def _through_actuators(self, run: Run, objective: LatticeObjective, part: AffinePart, candidates: Array,
-                           turns: Array, rng: Generator) -> tuple[Status, str]:
-        """Newton from each lattice point, then from lattice points of other base points."""
+                           rng: Generator, turns: Array | None = None) -> tuple[Status, str]:
+        """Newton from each lattice point, then from lattice points of other base points.
+
+        A base point without lattice points is a start itself, as are ``candidates`` without ``turns``.
+        """
         for _ in range(self.rounds):
+            if turns is None:
+                run.evaluate(candidates)
+                turns = objective.nearest_turns(candidates)
             for x, k in zip(candidates, turns, strict=True):
                 run.nit += 1
                 outcome = solve_residuals(run, objective, x, k)
-                run.evaluate(outcome.x[None])
                 run.propose(outcome.x)
+                run.evaluate(outcome.x[None])
                 if outcome.solved:
-                    return Status.CONVERGED, f"exact through the actuators after {run.nit} Newton solves"
+                    return Status.CONVERGED, f"exact after {run.nit} Newton solves"
             width = run.bounds[:, 1] - run.bounds[:, 0]
             base = run.bounds.mean(axis=1) + 0.8 * width * (rng.random(len(width)) - 0.5)
             point = np.isin(np.arange(len(base)), part.variables)
             base = np.where(point, base, 0.75 * part.base + 0.25 * base)  # heading stays near the linear one
-            points, turns = lattice_points(replace(part, base=base), run.bounds[part.variables])
-            candidates = np.tile(base, (len(points), 1))
-            candidates[:, part.variables] = points
+            candidates, turns = base[None], None
+            if has_influence(part):
+                points, found = lattice_points(replace(part, base=base), run.bounds[part.variables])
+                if len(points):
+                    candidates, turns = np.tile(base, (len(points), 1)), found
+                    candidates[:, part.variables] = points
         return Status.NO_EXACT, f"Newton solved none of {run.nit} starts"
 
     def _nearest(self, run: Run, objective: LatticeObjective, part: AffinePart, box: Array) -> tuple[Status, str]:
@@ -100,29 +127,44 @@ class Lattice:
         candidates = np.tile(part.base, (len(corners), 1))
         candidates[:, part.variables] = corners
         run.nit = 1
-        cost = run.evaluate(candidates).cost
-        best = candidates[int(np.argmin(cost))]
+        found = run.evaluate(candidates)
+        best = candidates[best_index(found.cost, found.violation)]
         if Capability.AFFINE not in objective.provides:
             outcome = solve_residuals(run, objective, best, objective.nearest_turns(best[None])[0])
-            run.evaluate(outcome.x[None])
             run.propose(outcome.x)
+            run.evaluate(outcome.x[None])
             if outcome.solved:
                 return Status.CONVERGED, "exact through the actuators, though no lattice point is inside the bounds"
         return Status.NO_EXACT, "no lattice point lies inside the bounds"
+
+
+def _evaluated(run: Run, candidates: Array) -> Array:
+    """(n,): costs, in batches small enough to keep to a budget in seconds."""
+    parts = [run.evaluate(candidates[i : i + _BATCH]).cost for i in range(0, len(candidates), _BATCH)]
+    return np.concatenate(parts)
+
+
+def has_influence(part: AffinePart) -> bool:
+    """Whether the wheel angles depend on the variables at all (not where start and goal heading are the same)."""
+    return part.matrix.size > 0 and bool(np.linalg.matrix_rank(part.matrix, tol=_NO_INFLUENCE) > 0)
 
 
 def lattice_points(part: AffinePart, box: Array) -> tuple[Array, Array]:
     """All exact solutions (n, k) inside ``box`` (k, 2), and their whole turns (n, c).
 
     With as many variables as critical wheels these are all there are; with more, for each set of turns the
-    solution nearest to the base point (scaled by the box) is taken.
+    solution nearest to the base point (scaled by the box) is taken. In a space so large that a wheel could
+    end at more than _MOST_TURNS turns, only the turns nearest to those of the base point are looked at.
+    Raises ArgumentError where the wheel angles do not depend on the variables.
     """
     rows = _independent_rows(part.matrix)
     matrix, offset = part.matrix[rows], part.offset[rows]
     centre, half = box.mean(axis=1), (box[:, 1] - box[:, 0]) / 2
     middle, reach = matrix @ centre + offset, np.abs(matrix) @ half
-    spans = [np.arange(np.ceil((m - r) / part.period), np.floor((m + r) / part.period) + 1)
-             for m, r in zip(middle, reach, strict=True)]
+    at_base = (matrix @ part.base[part.variables] + offset) / part.period
+    spans = [np.arange(np.ceil(max((m - r) / part.period, b - _MOST_TURNS / 2)),
+                       np.floor(min((m + r) / part.period, b + _MOST_TURNS / 2)) + 1)
+             for m, r, b in zip(middle, reach, at_base, strict=True)]
     turns = np.stack(np.meshgrid(*spans, indexing="ij"), axis=-1).reshape(-1, len(spans))
     if len(turns) == 0:
         return np.zeros((0, len(box))), np.zeros((0, len(part.offset)))
