@@ -159,14 +159,18 @@ def test_wrong_shape_is_a_failure():
 
 @pytest.mark.parametrize(("arguments", "what"), [
     ({"bounds": [[0, 1, 2]]}, "bounds"), ({"bounds": [[1, 0]]}, "bounds"), ({"bounds": [[0, np.inf]]}, "bounds"),
-    ({"optimizer": "magic"}, "optimizer"), ({"seed": -1}, "seed"), ({"seed": 0.5}, "seed"),
+    ({"bounds": "abc"}, "bounds"), ({"bounds": [[0, 1], [2]]}, "bounds"), ({"bounds": [[0, 1j]]}, "bounds"),
+    ({"optimizer": None}, "optimizer"), ({"budget": 500}, "budget"), ({"objective": 3}, "objective"),
+    ({"x0": "ab"}, "x0"), ({"optimizer": "magic"}, "optimizer"), ({"seed": -1}, "seed"), ({"seed": 0.5}, "seed"),
 ])
 def test_bad_arguments(arguments, what):
     with pytest.raises(ArgumentError, match=what):
-        minimize(sphere_batch, **{"bounds": BOX, **arguments})
+        minimize(**{"objective": sphere_batch, "bounds": BOX, **arguments})
 
 
-@pytest.mark.parametrize("arguments", [{"evaluations": 0}, {"seconds": 0.0}, {"evaluations": None}])
+@pytest.mark.parametrize("arguments", [{"evaluations": 0}, {"seconds": 0.0}, {"evaluations": None},
+                                       {"evaluations": 10.5}, {"evaluations": "10"}, {"evaluations": True},
+                                       {"seconds": np.inf}, {"target": np.nan}])
 def test_bad_budgets(arguments):
     with pytest.raises(ArgumentError, match="budget"):
         Budget(**arguments)

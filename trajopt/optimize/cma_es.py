@@ -42,6 +42,8 @@ class CmaEs:
     def _search(self, package: Any, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         low, width = run.bounds[:, 0], run.bounds[:, 1] - run.bounds[:, 0]
         d = len(low)
+        if x0 is not None:  # pycma samples around its start without evaluating it
+            run.evaluate(x0[None])
         population = 4 + int(3 * np.log(d))  # pycma's default
         for restart in range(self.restarts + 1):
             first = rng.random(d) if x0 is None or restart else (x0 - low) / width

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective, SymbolicProblem
 
 Array = NDArray[np.float64]
@@ -57,9 +58,12 @@ def as_objective(objective: Objective | Callable[[Any], Any], bounds: Array) -> 
 
     A function counts as a batch function when it maps three different points (3, d) to three numbers (3,)
     that agree with what it gives for single points, or when it cannot take single points at all.
+    Raises ArgumentError for what cannot be called.
     """
     if isinstance(objective, Objective):
         return objective
+    if not callable(objective):
+        raise ArgumentError("objective", objective, "an objective (objectives.base.Objective) or a function")
     d = len(bounds)
     return FunctionObjective(objective, d, batch=_is_batch(objective, bounds))
 
@@ -81,6 +85,8 @@ def _is_batch(function: Callable[[Any], Any], bounds: Array) -> bool:
 
 
 def _number(value: Any) -> float:
+    if np.iscomplexobj(value):
+        raise ValueError(f"the objective returned the complex number {value}; expected a real one")
     array = np.asarray(value, dtype=np.float64)
     if array.size != 1:
         raise ValueError(f"the objective returned shape {array.shape} for one candidate; expected a number")

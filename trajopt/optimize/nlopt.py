@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -25,7 +26,8 @@ class NLopt:
     """One of NLopt's derivative-free methods, on variables scaled to [0, 1].
 
     "direct" divides the bounds into ever smaller rectangles (Gablonsky's locally biased form) and needs no
-    start; "bobyqa" fits quadratic models (Powell 2009) from ``starts`` points: x0 or the middle, then random.
+    start (x0 is only evaluated first);
+    "bobyqa" fits quadratic models (Powell 2009) from ``starts`` points: x0 or the middle, then random.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
@@ -58,19 +60,25 @@ class NLopt:
         d = len(low)
         ended: list[Exception] = []
 
-        def cost(unit: Array, _: Array) -> float:
-            try:
-                return min(run.cost(np.clip(low + width * unit, low, low + width)), _LARGE)
-            except Exception as stop:  # the run's end: NLopt hides exceptions, so remember it
-                ended.append(stop)
-                raise package.ForcedStop() from stop
+        def cost_of(search: Any) -> Callable[[Array, Array], float]:
+            def cost(unit: Array, _: Array) -> float:
+                try:
+                    return min(run.cost(np.clip(low + width * unit, low, low + width)), _LARGE)
+                except Exception as stop:  # the run's end: exceptions cannot cross NLopt, so remember it
+                    ended.append(stop)
+                    search.force_stop()
+                    return _LARGE
 
+            return cost
+
+        if x0 is not None and self.method == "direct":  # which starts in the middle, whatever it is given
+            run.evaluate(x0[None])
         rounds = 1 if self.method == "direct" else self.starts
         for index in range(rounds):
             search = package.opt(getattr(package, _ALGORITHMS[self.method]), d)
             search.set_lower_bounds(np.zeros(d))
             search.set_upper_bounds(np.ones(d))
-            search.set_min_objective(cost)
+            search.set_min_objective(cost_of(search))
             if self.method == "bobyqa":  # DIRECT would stop at its first small rectangle
                 search.set_xtol_rel(self.tolerance)
             search.set_maxeval(min(run.remaining() + 1, 10_000_000))
@@ -79,8 +87,9 @@ class NLopt:
             try:
                 search.optimize(first if index == 0 else rng.random(d))
             except (package.ForcedStop, package.RoundoffLimited, RuntimeError):
-                if ended:
-                    raise ended[0] from None
+                pass  # why it ended is in ``ended``; a search that ran out of digits is just over
+            if ended:
+                raise ended[0]
             run.nit += 1
         return Status.CONVERGED, f"{rounds} starts" if rounds > 1 else "no rectangle is left to divide"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, cast
 
@@ -73,19 +74,25 @@ class ScipyLocal:
         from scipy import optimize
 
         point = _Point(run)
-        gradient = getattr(run.objective, "gradient", None)
         offered = Capability.GRADIENT in run.objective.provides and self.method != "Nelder-Mead"
         low, high = run.bounds.T
         options: dict[str, Any] = {"maxiter": 10_000}
+
+        def gradient(x: Array) -> Array:
+            run.ngev += 1
+            return np.asarray(cast(Any, run.objective).gradient(x))
+
         for index in range(self.starts):
             start = (low + high) / 2 if x0 is None else x0
             if index > 0:
                 start = rng.uniform(low, high)
             constraints = optimize.NonlinearConstraint(point.violation, -np.inf, 0.0)
-            result = optimize.minimize(
-                point.cost, start, method=self.method, bounds=optimize.Bounds(low, high), tol=self.tolerance,
-                jac=gradient if offered else None, options=options,
-                **({"constraints": [constraints]} if run.objective.constrained else {}))
+            with warnings.catch_warnings():  # trust-constr warns where a gradient stays, as on piecewise linear costs
+                warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
+                result = optimize.minimize(
+                    point.cost, start, method=self.method, bounds=optimize.Bounds(low, high), tol=self.tolerance,
+                    jac=gradient if offered else None, options=options,
+                    **({"constraints": [constraints]} if run.objective.constrained else {}))
             run.nit += int(result.nit)
         return Status.CONVERGED, f"{self.starts} starts"
 

@@ -68,7 +68,7 @@ def checked_optimizer(name: str, made: Any) -> Optimizer:
     """``made``, if it keeps the contract of optimizers. Raises ArgumentError naming what is missing."""
     for attribute in ("name", "needs", "stochastic", "minimize"):
         if not hasattr(made, attribute):
-            raise ArgumentError("optimizer", name, f"an object with the attribute '{attribute}' (optimize.base.Optimizer)")
+            raise ArgumentError("optimizer", name, f"an object with '{attribute}' (optimize.base.Optimizer)")
     return cast(Optimizer, made)
 
 
@@ -98,7 +98,9 @@ def minimize(objective: Objective | Callable[[Any], Any], bounds: ArrayLike, *,
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ArgumentError("seed", seed, "a whole number >= 0")
     chosen = automatic(problem) if optimizer == "auto" else optimizer
-    method = optimizer_named(chosen) if isinstance(chosen, str) else chosen
+    method = optimizer_named(chosen) if isinstance(chosen, str) else checked_optimizer(repr(chosen), chosen)
+    if not (budget is None or isinstance(budget, Budget)):
+        raise ArgumentError("budget", budget, "a Budget, e.g. Budget(evaluations=1000)")
     missing = method.needs - problem.provides
     if missing:
         raise ArgumentError("optimizer", method.name, "an optimizer that works without " + ", ".join(
