@@ -1,0 +1,297 @@
+"""Thesis 004 beside this package: tables of PowerBot's six experiments.
+
+    python -m benchmarks.powerbot_tables [--quick]
+
+Writes out/benchmarks/powerbot_tables.md and .csv. --quick leaves out the nonlinear programs and the physics.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.common import PROBLEMS, ROOT, ResultTable, publish
+from trajopt.control.commands import sample_time_study
+from trajopt.control.encounter import Course, Obstacle, course, safe_speed
+from trajopt.control.replan import Run, Sensor, halving_plan, replan, run_encounter
+from trajopt.control.tracking import Tracker
+from trajopt.errors import TrajoptError
+from trajopt.limits.limit import Limit
+from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
+from trajopt.limits.thesis_004 import thesis_slip_acceleration, thesis_tip_acceleration
+from trajopt.path_problem import PathProblem, load_path_problem
+from trajopt.refine import limit_jerk
+from trajopt.refine_path import corridor, optimize_path
+from trajopt.refine_profile import follow
+from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.powerbot import (
+    COG_HEIGHT,
+    COG_TO_CASTER_AXLE,
+    COG_TO_DRIVE_AXLE,
+    FRICTION,
+    REACTION_TIME,
+    SCAN_TIME,
+    SONAR_RANGE,
+    powerbot,
+)
+from trajopt.timing.linear import linear_factor
+from trajopt.timing.scaling import time_scale
+from trajopt.timing.trajectory import Trajectory
+from trajopt.world.ramp import lay_over
+
+DATA = ROOT / "tests" / "data" / "powerbot"
+TIMED = (1, 2, 4, 5)  # experiments that the thesis scales linearly
+SLOPES = (0.0, 5.99, -5.99)  # deg; Experiment 4's ramp
+CORRIDOR = 0.5  # m to either side of a knot, chosen: inside a hallway
+RESERVE = 0.7  # share of the friction that a plan for closed-loop driving uses; chosen
+PACKAGES = ("numpy", "toppra", "numba", "casadi", "pybullet")
+
+
+def table_rows() -> list[dict[str, str]]:
+    """The printed experiments."""
+    with (DATA / "experiments.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def problem(number: int) -> PathProblem:
+    """The problem file of an experiment."""
+    return load_path_problem(PROBLEMS / "powerbot" / f"experiment_{number}.toml")
+
+
+def timed(task: PathProblem, variant: str, engine: str = "auto") -> Trajectory:
+    """The path of a problem, timed."""
+    limits = task.as_limits(variant="thesis" if variant == "thesis" else "physical")
+    return time_scale(task.spline, limits, robot=task.platform, terrain=task.terrain, engine=engine)
+
+
+def printed_linear() -> ResultTable:
+    """Linear scaling from the printed maxima."""
+    rows = []
+    for row in table_rows():
+        if int(row["experiment"]) not in TIMED:
+            continue
+        factor = linear_factor(float(row["unscaled_v_max"]), float(row["unscaled_a_max"]),
+                               -float(row["unscaled_d_max"]), speed_limit=float(row["v_lim"]),
+                               acceleration_limit=float(row["a_lim"]), braking_limit=-float(row["d_lim"]))
+        ours, theirs = factor * float(row["unscaled_time"]), float(row["time"])
+        rows.append([row["experiment"], f"{ours:.2f}", row["time"], f"{ours / theirs - 1:+.2%}"])
+    return ResultTable("Linear scaling from the printed maxima, s", ("experiment", "ours", "printed", "difference"),
+                       rows)
+
+
+def braking_limits() -> ResultTable:
+    """Slip and tip limits: the thesis's formulas, and the right ones for braking."""
+    rows = []
+    for degrees in SLOPES:
+        slope = np.array([math.radians(degrees)])
+        thesis = float(thesis_slip_acceleration(slope, FRICTION)[0])
+        tip = float(thesis_tip_acceleration(slope)[0])
+        forward, braking = slip_range(math.radians(degrees))
+        rows.append([f"{degrees:g}", f"{thesis:.3f}", f"{forward:.3f}", f"{-thesis:.3f}", f"{-braking:.3f}",
+                     f"{tip:.2f}", "unsafe" if thesis > braking else "too strict"])
+    return ResultTable("Slip and tip limits by slope (uphill > 0), m/s^2", (
+        "slope, deg", "a_slip thesis (2.20)", "a_slip physical", "d_slip thesis (2.21)", "d_slip physical",
+        "a_tip thesis (2.24)", "thesis's braking is"), rows)
+
+
+def slip_range(slope: float) -> tuple[float, float]:
+    """Accelerating and braking limit of the drive wheels' friction on a straight slope (rad), m/s^2 > 0."""
+    axle, h = COG_TO_DRIVE_AXLE + COG_TO_CASTER_AXLE, COG_HEIGHT
+    normal, along = STANDARD_GRAVITY * math.cos(slope), STANDARD_GRAVITY * math.sin(slope)
+    push = FRICTION * COG_TO_CASTER_AXLE * normal / (axle + FRICTION * h)
+    hold = FRICTION * COG_TO_CASTER_AXLE * normal / (axle - FRICTION * h)
+    return push - along, hold + along
+
+
+def minimum_times() -> ResultTable:
+    """Linear and time-optimal durations on the fitted paths."""
+    rows = []
+    for row in table_rows():
+        number = int(row["experiment"])
+        if number not in TIMED:
+            continue
+        task = problem(number)
+        linear, best, right = (timed(task, *how) for how in (("thesis", "linear"), ("thesis",), ("physical",)))
+        v, a, d = (abs(float(row[name])) for name in ("v_lim", "a_lim", "d_lim"))
+        closed = float(row["distance"]) / v + v / (2 * a) + v / (2 * d)
+        rows.append([row["experiment"], f"{task.spline.length:.2f}", row["distance"], row["time"],
+                     f"{linear.duration:.2f}", f"{best.duration:.2f}", f"{linear.duration / best.duration:.2f}",
+                     f"{closed:.2f}", f"{right.duration:.2f}",
+                     f"{min(min(t.margins().values()) for t in (linear, best, right)):.0e}"])
+    return ResultTable("Times on the fitted paths, s", (
+        "experiment", "length, m", "printed", "time printed", "linear", "optimal, thesis's limits", "ratio",
+        "L/V + V/2A + V/2D, printed", "optimal, physical limits", "least margin"), rows)
+
+
+def refinements(numbers: Sequence[int]) -> ResultTable:
+    """Jerk limits, and path and timing together."""
+    rows = []
+    for number in numbers:
+        task = problem(number)
+        base = timed(task, "physical")
+        cells = [str(number), f"{base.duration:.2f}"]
+        for jerk in (4.0, 1.0):
+            try:
+                cells.append(f"{limit_jerk(base, jerk).duration:.2f}")
+            except TrajoptError as error:
+                cells.append(type(error).__name__)
+        level, ramps = corridor(task.flat_path), [r.ramp for r in task.ramps]
+        count = len(task.path.knots) - 2
+        found = optimize_path(lambda z, level=level, ramps=ramps: lay_over(level(z), ramps) if ramps else level(z),
+                              np.tile([-CORRIDOR, CORRIDOR], (count, 1)), task.as_limits(variant="physical"),
+                              robot=task.platform, terrain=task.terrain, steps=6)
+        rows.append([*cells, f"{found.trajectory.duration:.2f}", f"{found.gain:.1%}"])
+    return ResultTable("Refinement, physical limits, s", ("experiment", "optimal", "jerk 4 m/s^3", "jerk 1 m/s^3",
+                                                         f"path free by {CORRIDOR} m", "gain over two stages"), rows)
+
+
+def sample_times() -> ResultTable:
+    """What digitising the commands costs, without any disturbance."""
+    motion = timed(problem(2), "thesis", "linear")
+    steps = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0)
+    with (DATA / "tables_1_2_sample_time.csv").open(encoding="utf-8") as file:
+        printed = {float(r["sample_time_s"]): r for r in csv.DictReader(x for x in file if not x.startswith("#"))}
+    rows = []
+    for held, mean in zip(sample_time_study(motion, steps, "held"), sample_time_study(motion, steps, "mean"),
+                          strict=True):
+        theirs = printed.get(held.sample_time)
+        rows.append([f"{held.sample_time:g}", f"{held.speed_error:.4f}", f"{held.goal_error:.3f}",
+                     f"{mean.goal_error:.4f}", theirs["speed_error"] if theirs else "",
+                     theirs["goal_error_m"] if theirs else ""])
+    return ResultTable("Sample time of the commands, experiment 2", (
+        "sample time, s", "speed error held, m/s", "goal error held, m", "goal error mean, m",
+        "speed error measured (Table 1)", "goal error measured (Table 2)"), rows)
+
+
+def encounter_three() -> ResultTable:
+    """Experiment 3: two things appear 0.6 m ahead and go away."""
+    task = problem(3)
+    rows = []
+    plans = {"linear": timed(task, "thesis", "linear"), "optimal": timed(task, "physical")}
+    for name, plan in plans.items():
+        where = course(plan, task.platform)
+        sensor = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME)
+        free = run_encounter(where, sensor, lambda *_: [], longest=200.0)
+        for rule, planner in (("stops in time", replan), ("halving (thesis)", halving_plan)):
+            run = run_encounter(where, sensor, appearing(task, where), planner=planner, longest=300.0)
+            rows.append([name, rule, f"{plan.duration:.1f}", f"{free.times[-1]:.1f}", f"{run.times[-1]:.1f}",
+                         f"{run.v.max():.2f}", yes(not run.hit), yes(run.kept), yes(run.arrived),
+                         f"{where.length - run.s[-1]:.1e}", f"{slowest(run):.1f}"])
+    return ResultTable("Experiment 3 (printed: 46.5 s planned, 49.3 s with obstacles)", (
+        "plan", "rule", "plan, s", "free way, s", "with obstacles, s", "top speed, m/s", "no contact",
+        "stopping distance kept", "arrived", "distance missing, m", "slowest replan, ms of CPU"), rows)
+
+
+def appearing(task: PathProblem, where: Course):  # type: ignore[no-untyped-def]
+    """A world in which the problem's obstacles appear ahead of the robot's front and vanish again."""
+    placed: dict[int, Obstacle] = {}
+    front = float(where.outline[:, 0].max())
+
+    def world(now: float, pose: np.ndarray) -> list[Obstacle]:
+        found = []
+        for i, thing in enumerate(task.obstacles):
+            if thing.appears <= now < thing.appears + thing.clears_after:
+                if i not in placed:
+                    ahead = front + thing.distance + 0.15
+                    placed[i] = Obstacle((pose[0] + ahead * math.cos(pose[2]), pose[1] + ahead * math.sin(pose[2])),
+                                         0.15)
+                found.append(placed[i])
+        return found
+
+    return world
+
+
+def safe_speeds() -> ResultTable:
+    """Safe speed over range and delay, braking of the ramp going down."""
+    braking = slip_range(math.radians(-5.99))[1]
+    delays = (0.1, 0.2, 0.5, 1.0)
+    rows = [[f"{reach:g}", *(f"{safe_speed(reach, delay, braking):.2f}" for delay in delays), f"{reach / 1.0:.2f}"]
+            for reach in (0.6, 1.0, 2.0, 4.0, 6.0)]
+    return ResultTable(f"Safe speed braking at {braking:.2f} m/s^2 (down the ramp), m/s", (
+        "range, m", *(f"delay {d:g} s" for d in delays), "thesis (2.26), 1 s"), rows)
+
+
+def following() -> ResultTable:
+    """Experiment 6."""
+    task = problem(6)
+    profile = task.speed_profile()
+    assert profile is not None
+    rows = []
+    for manner in ("below", "least_squares"):
+        found = follow(task.spline, profile, task.as_limits(), robot=task.platform,
+                       manner="below" if manner == "below" else "least_squares")
+        rows.append([manner, f"{found.trajectory.duration:.2f}", f"{found.error:.4f}", f"{found.largest_error:.3f}",
+                     f"{min(found.trajectory.margins().values()):.0e}"])
+    return ResultTable("Experiment 6: following a profile (printed: 30.0 s, measured error 0.043 m/s)", (
+        "manner", "time, s", "speed error over the path, m/s", "largest", "least margin"), rows)
+
+
+def physics(numbers: Sequence[int]) -> ResultTable:
+    """Open and closed loop in pybullet beside the measured columns."""
+    from trajopt.simulate.differential import Floor, drive_in_pybullet
+    from trajopt.simulate.powerbot_model import powerbot_drive
+
+    robot = powerbot(caster_half_track=0.0)  # balancing casters: one point of support behind
+    with (DATA / "measured.csv").open(encoding="utf-8") as file:
+        measured = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    rows = []
+    for number in numbers:
+        task = problem(number)
+        limits: list[Limit] = [x for x in task.as_limits(variant="physical") if x.name not in ("slip", "tip")]
+        limits.append(Slip(RESERVE * FRICTION, per_wheel=True))
+        if number == 6:
+            limits.append(Speed(1.0, name="profile_top"))
+        plan = time_scale(task.spline, limits, robot=robot, terrain=task.terrain)
+        floor = Floor(task.friction, tuple(r.ramp for r in task.ramps))
+        theirs = [m for m in measured if int(m["experiment"]) == number]
+        for loop, tracker in (("open", None), ("closed", Tracker())):
+            seen = drive_in_pybullet(plan, powerbot_drive(robot), floor, tracker=tracker)
+            rows.append([str(number), loop, f"{plan.duration:.1f}", f"{seen.speed_error:.4f}",
+                         f"{math.degrees(seen.heading_error):.3f}", f"{seen.goal_offset:.4f}",
+                         f"{math.degrees(seen.final_heading_error):.3f}", f"{seen.slip_ratio:.2%}",
+                         *(" ".join(m[k] or "-" for m in theirs)
+                           for k in ("speed_error", "heading_error", "goal_offset"))])
+    return ResultTable(f"Physics: friction {FRICTION}, plans at {RESERVE:.0%} of it per wheel", (
+        "experiment", "loop", "time, s", "speed error, m/s", "heading error, deg", "goal offset, m",
+        "final heading, deg", "wheel slip / speed", "measured speed error", "measured heading error",
+        "measured goal offset"), rows)
+
+
+def slowest(run: Run) -> float:
+    """ms."""
+    return 1e3 * run.slowest_replan
+
+
+def yes(holds: bool) -> str:
+    """For tables."""
+    return "yes" if holds else "no"
+
+
+NOTES = (
+    "Linear times differ from the print by its rounding (three digits of the maxima). Slip limits differ by the "
+    "rounded coefficients of eq. 2.20. The thesis brakes with minus its accelerating limit (eq. 2.21): braking loads "
+    "the front drive axle, so on the flat that is too strict, and downhill it is unsafe.",
+    "Knots between start and goal are fitted, not printed; residuals stand in the problem files.",
+    "Plans for the physics stand on three points (casters balance), and keep a reserve for the controller.",
+)
+
+
+def main() -> None:
+    """Print and write the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--quick", action="store_true", help="without nonlinear programs and physics")
+    quick = parser.parse_args().quick
+    tables = [printed_linear(), braking_limits(), minimum_times(), sample_times(), encounter_three(), safe_speeds(),
+              following()]
+    if not quick:
+        tables += [refinements(TIMED), physics((*TIMED, 6))]
+    publish("powerbot_tables", tables, packages=PACKAGES, notes=NOTES)
+
+
+if __name__ == "__main__":
+    main()
