@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -24,14 +23,14 @@ from numpy.typing import NDArray
 from trajopt.errors import TrajoptError
 from trajopt.study.cases import CaseTable
 from trajopt.study.engines import Engine
-from trajopt.study.host import RETRIES, CaseLimits, ChunkJob, ChunkReport, run_chunk, stop_mark
+from trajopt.study.host import RETRIES, CaseLimits, ChunkJob, ChunkReport, run_chunk, stop_mark, warm_up
 from trajopt.study.rows import CRASHED, Kind, Row, row_table
 from trajopt.study.runfunction import Packed
 from trajopt.study.store import Store
 
 SAMPLED = 3  # cases run first, to learn their time and columns
-SHORTEST_CHUNK, LONGEST_CHUNK = 0.5, 5.0  # s of work; between them, twenty chunks a worker. chosen
-_CHUNKS_A_WORKER = 20
+SHORTEST_CHUNK, LONGEST_CHUNK = 0.25, 5.0  # s of work. chosen: a part costs some 10 ms, a crash costs a chunk
+_SHARE = 4  # a chunk is a quarter of what is left for its worker: large first, small at the end; chosen
 MOST_CASES = 10_000  # cases of one chunk, whatever their time; chosen
 _AHEAD = 2  # chunks in flight a worker, so that none waits for the submitter; chosen
 _STOP_GRACE = 20.0  # s that workers get to store what they have after a stop; chosen
@@ -141,7 +140,7 @@ class Drive:
         if self.seconds_a_case is None:
             return SAMPLED
         time_left = left * self.seconds_a_case / self.engine.workers
-        target = min(max(time_left / _CHUNKS_A_WORKER, SHORTEST_CHUNK), LONGEST_CHUNK)
+        target = min(max(time_left / _SHARE, SHORTEST_CHUNK), LONGEST_CHUNK)
         return int(min(max(target / max(self.seconds_a_case, 1e-9), 1), MOST_CASES, left))
 
     def _take(self) -> _Chunk | None:
@@ -258,7 +257,11 @@ class Drive:
             context = self.engine.start()
             executor = context.__enter__()
             try:
-                executor.submit(os.getpid).result()
+                starts = [executor.submit(warm_up, self.setup.run, self.setup.limits.memory)
+                          for _ in range(self.engine.workers)]
+                done, _ = wait(starts, return_when=FIRST_COMPLETED)
+                for start in done:
+                    start.result()
                 return context, executor
             except BaseException as error:
                 with contextlib.suppress(BrokenExecutor):

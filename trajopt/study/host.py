@@ -7,6 +7,7 @@ costs its own row: the child dies, the host goes on with a new one.
 from __future__ import annotations
 
 import contextlib
+import math
 import mmap
 import os
 import pickle
@@ -133,7 +134,7 @@ def _rows_of(job: ChunkJob, should_stop: Callable[[], bool]) -> list[Row]:
     deaths: Counter[int] = Counter()
     todo = list(range(len(cases)))
     while todo and not should_stop():
-        child = _child_for(job)
+        child = _child_for(job.run, job.limits.memory)
         death = child.work([(i, cases[i].id, dict(cases[i].values)) for i in todo], rows, job.limits.seconds,
                            should_stop)
         todo = [i for i in todo if i not in rows]
@@ -272,14 +273,24 @@ class _Overdue(Exception):
 _thread = threading.local()  # the child of this thread: starting one costs 0.2 s and its imports
 
 
-def _child_for(job: ChunkJob) -> _Child:
+def warm_up(run: Packed, memory: int) -> None:
+    """Start this thread's child, so that all workers start theirs at the same time, before any case waits.
+
+    Raises RunLoadError. A child that dies here is no matter: the first chunk starts another.
+    """
+    import pyarrow.parquet  # noqa: F401 - the first part would pay for it
+
+    _child_for(run, memory).work([], {}, math.inf, lambda: False)
+
+
+def _child_for(run: Packed, memory: int) -> _Child:
     """The living child of this thread for this run function, a new one where there is none."""
     child: _Child | None = getattr(_thread, "child", None)
-    if child is not None and child.alive and child.run == job.run and child.memory == job.limits.memory:
+    if child is not None and child.alive and child.run == run and child.memory == memory:
         return child
     if child is not None and not child.connection.closed:
         child.close()
-    child = _thread.child = _Child(job.run, job.limits.memory)
+    child = _thread.child = _Child(run, memory)
     return child
 
 

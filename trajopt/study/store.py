@@ -160,7 +160,7 @@ class Store:
                 except FileNotFoundError:  # compacted away between listing and reading: list again
                     gone = True
                 except (pa.ArrowInvalid, OSError) as error:
-                    raise StoreError(f"{file}: a damaged part ({error}); move it away and run the sweep again") from None
+                    raise StoreError(f"{file}: a damaged part ({error}); move it away, run again") from None
             if not gone:
                 break
             time.sleep(0.01 * attempt)
