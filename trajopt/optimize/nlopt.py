@@ -61,24 +61,23 @@ class NLopt:
         ended: list[Exception] = []
 
         def cost_of(search: Any) -> Callable[[Array, Array], float]:
-            searches: list[Any] = []
+            def cost(unit: Array, _: Array) -> float:
+                if ended:  # NLopt may ask a few times more before it stops
+                    return _LARGE
+                try:
+                    return min(run.cost(np.clip(low + width * unit, low, low + width)), _LARGE)
+                except Exception as stop:  # the run's end; exceptions do not pass NLopt reliably, so remember it
+                    ended.append(stop)
+                    search.force_stop()
+                    return _LARGE
 
-        def cost(unit: Array, _: Array) -> float:
-            if ended:  # NLopt may ask a few times more before it stops
-                return _LARGE
-            try:
-                return min(run.cost(np.clip(low + width * unit, low, low + width)), _LARGE)
-            except Exception as stop:  # the run's end; exceptions do not pass NLopt reliably, so remember it
-                ended.append(stop)
-                searches[-1].force_stop()
-                return _LARGE
+            return cost
 
         if x0 is not None and self.method == "direct":  # which starts in the middle, whatever it is given
             run.evaluate(x0[None])
         rounds = 1 if self.method == "direct" else self.starts
         for index in range(rounds):
             search = package.opt(getattr(package, _ALGORITHMS[self.method]), d)
-            searches.append(search)
             search.set_lower_bounds(np.zeros(d))
             search.set_upper_bounds(np.ones(d))
             search.set_min_objective(cost_of(search))
