@@ -127,3 +127,10 @@ def test_doubling_back_is_infeasible_and_says_where():
 def test_bad_points(points, what):
     with pytest.raises(ArgumentError, match=what):
         Path.through(points)
+
+
+def test_a_heading_of_its_own_needs_level_ground():
+    """Samples of such a path are planar, so its length would count a climb that its twist does not."""
+    Path.through([[0, 0, 1], [1, 0, 1]], heading=[0, 1])
+    with pytest.raises(ArgumentError, match="level ground"):
+        Path.through([[0, 0, 0], [1, 0, 1]], heading=[0, 1])

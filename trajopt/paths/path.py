@@ -45,8 +45,11 @@ class Path:
                 raise ArgumentError(name, np.asarray(values).tolist(), "finite numbers")
         if self.heading is not None and np.shape(self.heading) != (self.basis.size,):
             raise ArgumentError("heading", np.shape(self.heading), f"shape ({self.basis.size},)")
-        if not self.turning_length > 0:
-            raise ArgumentError("turning_length", self.turning_length, "a length > 0 m")
+        if not 0 < self.turning_length < np.inf:
+            raise ArgumentError("turning_length", self.turning_length, "a finite length > 0 m")
+        if self.heading is not None and shape[1] == 3 and np.ptp(self.coordinates[: len(self.basis.knots), 2]) > 0:
+            raise ArgumentError("heading", np.asarray(self.heading).tolist(), "None on a path that climbs: a heading "
+                                "of its own is for level ground")
 
     @classmethod
     def through(cls, points: ArrayLike, *, heading: ArrayLike | None = None, knots: ArrayLike | None = None,
