@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import jsonschema
+import numpy as np
 import pytest
 import tomllib
 from conftest import ROOT, SMDW, smdw_problem
@@ -87,6 +88,13 @@ def test_replace_takes_sections_and_dotted_keys(scenario):
     assert changed.actuator.enabled
     assert changed.actuator.saturation == scenario.actuator.saturation
     assert not scenario.actuator.enabled
+
+
+def test_replace_takes_arrays_and_sections(scenario):
+    changed = scenario.replace({"goal.wheels": np.ones(4), "limits.speed": np.int64(2)}, scene=scenario.scene)
+    assert changed.goal.wheels == (1, 1, 1, 1)
+    assert changed.limits.speed == 2
+    assert changed.scene == scenario.scene
 
 
 def test_schema_file_is_current_and_accepts_the_problems():

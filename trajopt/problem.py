@@ -272,6 +272,8 @@ def read_tables(path: str | FilePath, overrides: Mapping[str, Any] | None = None
         data = tomllib.loads(FilePath(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ProblemError(str(path), "file", "missing", "an existing problem file (*.toml)") from None
+    except (NotADirectoryError, PermissionError, TypeError) as error:
+        raise ProblemError(str(path), "file", str(error), "a readable problem file (*.toml)") from None
     except IsADirectoryError:
         raise ProblemError(str(path), "file", "a directory", "a problem file (*.toml)") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -305,7 +307,7 @@ def validated(model: type[Model], data: dict[str, Any], file: str) -> Model:
         raise ProblemError(file, "source", data["source"], "no such key: it is set by the loader")
     try:
         # Through JSON, because only there does strict mode take arrays for tuples.
-        return model.model_validate_json(json.dumps({**data, "source": file}, default=str), strict=True)
+        return model.model_validate_json(json.dumps({**data, "source": file}, default=_as_json), strict=True)
     except ValidationError as error:
         raise translated(error, file, model) from None
 
@@ -328,6 +330,13 @@ def translated(error: ValidationError, file: str, model: type[BaseModel]) -> Pro
     expected = message[0].lower() + message[1:].removeprefix("nput should be ")
     expected = expected.removeprefix("i") if message.startswith("Input should be ") else expected
     return ProblemError(file, key, first["input"], expected)
+
+
+def _as_json(value: Any) -> Any:
+    """NumPy values and sections as JSON; anything else as text, which validation then refuses."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", exclude_none=True)
+    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def _joined(location: tuple[int | str, ...]) -> str:
