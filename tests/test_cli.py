@@ -58,7 +58,8 @@ def test_a_solution_that_does_not_hold_exits_with_one():
     (("solve", SCENARIO, "--seconds", "0"), "time > 0"),
     (("solve", "problems/powerbot/experiment_1.toml"), "load_path_problem"),
     (("validate", "nowhere"), "nowhere"),
-    (("explain", SCENARIO, "--engine", "magic", "--set", "spline.duration=0"), "spline.duration"),
+    (("explain", SCENARIO, "--set", "spline.duration=0"), "spline.duration"),
+    (("explain", SCENARIO, "--engine", "toppra"), "--engine"),
 ])
 def test_unusable_input_is_one_line_and_exit_two(arguments, words):
     done = trajopt(*arguments)

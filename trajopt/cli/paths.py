@@ -76,13 +76,16 @@ def _timed(plan: Path, set_: list[str] | None, engine: str) -> Trajectory:
     from trajopt.pipeline import solve, time_path
     from trajopt.problem import load_problem, problem_kind
 
+    timed_here = not plan.is_dir() and problem_kind(plan) == "path"
+    if engine != "auto" and not timed_here:
+        raise ArgumentError("--engine", engine, "auto, except for a problem with a table [path]")
     if plan.is_dir():
         from trajopt.report.run_folder import read_solution
 
         if set_:
             raise ArgumentError("--set", set_, "no overrides with a run folder; give the problem file instead")
         solution = read_solution(plan)
-    elif problem_kind(plan) == "path":
+    elif timed_here:
         return time_path(load_path_problem(plan, overrides(set_)), engine=engine)
     else:
         solution = solve(load_problem(plan, overrides(set_)))
