@@ -253,9 +253,16 @@ class Drive:
 
     def _started(self) -> tuple[AbstractContextManager[Executor], Executor]:
         """A working executor. One whose workers cannot even start is no case's fault: raises WorkerStartError."""
+        fault: Exception | None = None
         for _ in range(RETRIES + 1):
             context = self.engine.start()
-            executor = context.__enter__()
+            try:
+                executor = context.__enter__()
+            except TrajoptError:
+                raise
+            except Exception as error:  # a cluster some of whose processes died while it started
+                fault = error
+                continue
             try:
                 starts = [executor.submit(warm_up, self.setup.run, self.setup.limits.memory)
                           for _ in range(self.engine.workers)]
@@ -264,12 +271,12 @@ class Drive:
                     start.result()
                 return context, executor
             except BaseException as error:
-                with contextlib.suppress(BrokenExecutor):
+                with contextlib.suppress(Exception):
                     context.__exit__(None, None, None)
                 if not isinstance(error, BrokenExecutor) and not _is_death(error):
                     raise
-        raise WorkerStartError(f"{self.engine.name}: workers die at their start, before any case; a script that runs a "
-                               "sweep needs `if __name__ == \"__main__\":` around what it does")
+        raise WorkerStartError(f"{self.engine.name}: workers die at their start, before any case; a script that runs "
+                               "a sweep needs `if __name__ == \"__main__\":` around what it does") from fault
 
     def _rebuilt(self, context: AbstractContextManager[Executor],
                  rebuilds: int) -> tuple[AbstractContextManager[Executor], Executor]:

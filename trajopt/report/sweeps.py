@@ -1,0 +1,129 @@
+"""Pictures of sweeps: a heat map over two axes, lines with intervals, pairs of columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pandas as pd
+import typer
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from trajopt.errors import ArgumentError
+from trajopt.study.store import open_store
+
+DOTS = 150  # dots per inch of saved pictures
+INTERVAL = (10.0, 90.0)  # percentiles between which a line's band lies; chosen
+_MOST_PAIRS = 6  # columns of a picture of pairs, to stay readable; chosen
+_MOST_POINTS = 5_000  # points drawn in one panel of pairs; chosen
+
+
+def heat_map(frame: pd.DataFrame, x: str, y: str, value: str) -> Figure:
+    """Mean of ``value`` over two axes, written into the cells; finished cases only.
+
+    A cell without finished cases stays empty. Raises ArgumentError for unknown columns and empty tables.
+    """
+    rows = _done(frame, (x, y, value))
+    means = rows.assign(**{value: rows[value].astype(float)}).pivot_table(index=y, columns=x, values=value)
+    figure = Figure(figsize=(1.6 + 0.75 * len(means.columns), 1.4 + 0.45 * len(means.index)), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    cells = means.to_numpy(dtype=np.float64)
+    image = axes.imshow(cells, origin="lower", aspect="auto", cmap="viridis")
+    axes.set_xticks(range(len(means.columns)), [_short(v) for v in means.columns])
+    axes.set_yticks(range(len(means.index)), [_short(v) for v in means.index])
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    middle = (np.nanmin(cells) + np.nanmax(cells)) / 2
+    if cells.size <= 400:
+        for (row, column), cell in np.ndenumerate(cells):
+            if np.isfinite(cell):
+                axes.text(column, row, f"{cell:.3g}", ha="center", va="center", fontsize=8,
+                          color="black" if cell > middle else "white")
+    figure.colorbar(image, label=f"mean {value}")
+    return figure
+
+
+def lines(frame: pd.DataFrame, x: str, value: str, by: str | None = None) -> Figure:
+    """Median of ``value`` over ``x``, a line for each value of ``by``, with bands from the 10th to the 90th
+    percentile. Finished cases only. Raises ArgumentError as ``heat_map``."""
+    rows = _done(frame, (x, value) if by is None else (x, value, by))
+    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    for name, group in [("", rows)] if by is None else list(rows.groupby(by)):
+        places = group.groupby(x)[value]
+        middle = places.median().astype(float)
+        low, high = (places.apply(lambda v, p=p: float(np.percentile(v.astype(float), p))) for p in INTERVAL)
+        label = None if by is None else f"{by} = {_short(name)}"
+        line, = axes.plot(middle.index, middle, marker="o", markersize=4, label=label)
+        axes.fill_between(middle.index, low, high, color=line.get_color(), alpha=0.18, linewidth=0)
+    axes.set_xlabel(x)
+    axes.set_ylabel(f"{value} (median, 10-90 %)")
+    axes.grid(alpha=0.3)
+    if by is not None:
+        axes.legend()
+    return figure
+
+
+def pairs(frame: pd.DataFrame, columns: Sequence[str]) -> Figure:
+    """Scatter of every pair of numeric columns, histograms on the diagonal. Raises ArgumentError."""
+    if not 2 <= len(columns) <= _MOST_PAIRS:
+        raise ArgumentError("columns", list(columns), f"2 to {_MOST_PAIRS} columns")
+    rows = _done(frame, columns)
+    values = rows[list(columns)].astype(float).to_numpy()
+    values = values[:: max(1, len(values) // _MOST_POINTS)]
+    count = len(columns)
+    figure = Figure(figsize=(2.0 * count + 0.8, 2.0 * count + 0.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.subplots(count, count, squeeze=False)
+    for (i, j), axes in np.ndenumerate(grid):
+        if i == j:
+            axes.hist(values[:, i], bins=30, color="0.6")
+        else:
+            axes.plot(values[:, j], values[:, i], ".", markersize=2, alpha=0.5)
+        axes.tick_params(labelsize=7)
+        if i == count - 1:
+            axes.set_xlabel(columns[j], fontsize=8)
+        if j == 0:
+            axes.set_ylabel(columns[i], fontsize=8)
+    return figure
+
+
+def plot(store: Annotated[Path, typer.Argument(help="store of a sweep (its directory)", show_default=False)],
+         out: Annotated[Path, typer.Argument(help="picture to write (*.png)")],
+         value: Annotated[str, typer.Option(help="result to show")] = "",
+         x: Annotated[str, typer.Option(help="column along x")] = "",
+         y: Annotated[str, typer.Option(help="column along y: a heat map")] = "",
+         by: Annotated[str, typer.Option(help="a line for each of its values")] = "",
+         pair: Annotated[list[str] | None, typer.Option("--pair", help="column of a picture of pairs; repeat")] = None,
+         ) -> None:
+    """Draw a sweep: --x --y --value (heat map), --x --value [--by] (lines), or --pair twice or more."""
+    frame = open_store(store, create=False).frame()
+    if pair:
+        figure = pairs(frame, pair)
+    elif x and y and value:
+        figure = heat_map(frame, x, y, value)
+    elif x and value:
+        figure = lines(frame, x, value, by or None)
+    else:
+        raise ArgumentError("options", None, "--x --y --value, --x --value [--by], or --pair twice or more")
+    figure.savefig(out, dpi=DOTS)
+    typer.echo(f"written to {out}")
+
+
+def _done(frame: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:
+    for name in columns:
+        if name not in frame.columns:
+            raise ArgumentError("column", name, "one of " + ", ".join(frame.columns))
+    rows = frame[frame["status"] == "done"].dropna(subset=list(columns))
+    if rows.empty:
+        raise ArgumentError("columns", list(columns), "columns with at least one finished case")
+    return rows
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
