@@ -25,7 +25,7 @@ def _slurm_answers() -> bool:
     if shutil.which("sinfo") is None:
         return False
     told = subprocess.run(["sinfo", "--noheader", "--format=%T"], capture_output=True, text=True, check=False)
-    return told.returncode == 0 and any(s in told.stdout for s in ("idle", "mixed", "allocated"))
+    return told.returncode == 0 and any(s in told.stdout for s in ("idle", "mixed", "alloc", "completing"))
 
 
 @pytest.fixture(autouse=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.errors import ArgumentError, ProblemError, TrajoptError
-from trajopt.maneuver_problem import ManeuverProblem
+from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
 from trajopt.problem import Problem, load_problem
 from trajopt.study.axes import combined, with_derived
 from trajopt.study.cases import CaseTable
@@ -73,7 +73,13 @@ def _plan(data: Mapping[str, Any], file: Path, text: str) -> SweepPlan:
 
 
 def _problem(file: Path, name: str) -> Problem | ManeuverProblem:
-    found = load_problem(file.parent / name)
+    """A problem with a goal, or one with an obstacle, by what its file holds."""
+    place = file.parent / name
+    try:
+        tables = tomllib.loads(place.read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError):
+        tables = {}  # load_problem says what is wrong
+    found = load_maneuver(place) if "obstacle" in tables and "goal" not in tables else load_problem(place)
     if not isinstance(found, (Problem, ManeuverProblem)):
         raise ArgumentError("problem", name, "a problem with a goal or an obstacle; for others use run = "
                                              "'module:function' alone")
