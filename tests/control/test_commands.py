@@ -61,7 +61,7 @@ def test_export_and_compare(plan: Trajectory, tmp_path: FilePath) -> None:
     t = np.arange(0, plan.duration, 0.1)
     state = plan.at(t)
     log = tmp_path / "log.csv"
-    shift = np.column_stack([t, state.pose + [0.0, 0.1, 0.05], state.twist[:, 0] + 0.02])
+    shift = np.column_stack([t, state.pose + np.array([0.0, 0.1, 0.05]), state.twist[:, 0] + 0.02])
     np.savetxt(log, shift, delimiter=",", header="t,x,y,yaw,v", comments="")
     found = compare_log(plan, log)
     assert found.speed_error == pytest.approx(0.02, rel=1e-6)
