@@ -33,7 +33,7 @@ def write_report(store: Store, out: Path) -> Path:
              "to the best known cost is left. In brackets: median share left; median seconds.", ""]
     text += _share_table(tables, out)
     text += ["", "Each curve counts only the problems its optimizer can work on (the lattice needs affine wheel "
-             "angles, for example), so compare curves of optimizers with the same problems: the table above tells which."]
+             "angles, for example), so compare curves of optimizers with the same problems: the table tells which."]
     for title, file in figures:
         text += ["", f"## {title}", "", f"![{title}]({file})"]
     text += ["", "## Expected running time", "", *_running_table(tables, out)]
