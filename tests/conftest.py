@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
+from smdw_problems import SMDW, smdw_problem
 
-from trajopt.problem import Problem, load_problem, problem_kind
-
-ROOT = Path(__file__).parent.parent
-SMDW = sorted(path.stem for path in (ROOT / "problems/smdw").glob("*.toml") if problem_kind(path) == "search")
-
-
-def smdw_problem(name: str) -> Problem:
-    """A problem of thesis 000 by file name."""
-    return load_problem(ROOT / f"problems/smdw/{name}.toml")
+from trajopt.problem import Problem
 
 
 @pytest.fixture(params=SMDW)

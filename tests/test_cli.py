@@ -8,7 +8,7 @@ import sys
 
 import pandas as pd
 import pytest
-from conftest import ROOT
+from smdw_problems import ROOT
 
 SCENARIO = "problems/smdw/scenario_1_forward35.toml"
 RUN = "from trajopt.cli import main; main()"

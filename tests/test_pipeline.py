@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT, smdw_problem
+from smdw_problems import ROOT, smdw_problem
 
 import trajopt
 from trajopt.errors import ArgumentError, MissingDependencyError
@@ -112,7 +112,8 @@ def test_public_names_survive_importing_every_module():
         assert trajopt.load_problem(ROOT / "problems/smdw/scenario_2_forward35.toml") == problem
         solution = trajopt.solve(problem)
         assert trajopt.minimize(lambda x: x[0] ** 2, [[-1, 1]], budget=trajopt.Budget(100)).fun < 0.1
-        assert trajopt.time_scale(solution.path, problem.limits.as_limits(), robot=solution.trajectory.robot).duration > 0
+        limits, robot = problem.limits.as_limits(), solution.trajectory.robot
+        assert trajopt.time_scale(solution.path, limits, robot=robot).duration > 0
     for name in trajopt.__all__:
         assert getattr(trajopt, name) is not None
     with pytest.raises(AttributeError):

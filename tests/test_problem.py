@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+import tomllib
 
 import jsonschema
 import numpy as np
 import pytest
-import tomllib
-from conftest import ROOT, SMDW, smdw_problem
+from smdw_problems import ROOT, SMDW, smdw_problem
 
 from trajopt.errors import ProblemError
 from trajopt.problem import load_problem, problem_schema
@@ -73,7 +73,8 @@ def test_missing_section_is_named(tmp_path):
         load_problem(file)
 
 
-@pytest.mark.parametrize(("content", "words"), [(None, "existing"), (b"title = ", "valid TOML"), (b"\xff\xfe", "UTF-8")])
+@pytest.mark.parametrize(("content", "words"), [
+    (None, "existing"), (b"title = ", "valid TOML"), (b"\xff\xfe", "UTF-8")])
 def test_unreadable_files(tmp_path, content, words):
     file = tmp_path / "p.toml"
     if content is not None:

@@ -131,6 +131,8 @@ def time_path(problem: PathProblem, *, engine: str = "auto") -> Trajectory:
 
     Raises InfeasibleError, naming limit and place, where no motion keeps the limits.
     """
+    if not isinstance(problem, PathProblem):
+        raise ArgumentError("problem", type(problem).__name__, "a PathProblem (load_path_problem reads one)")
     return time_scale(problem.spline, problem.as_limits(), robot=problem.platform, terrain=problem.terrain,
                       engine=engine)
 
@@ -142,6 +144,10 @@ def validate(trajectory: Trajectory, problem: Problem, *, engine: str = "pybulle
     ``engine``: "pybullet" or "mujoco". Raises MissingDependencyError where the engine is not installed and
     SimulationError where the simulation leaves physics.
     """
+    if not isinstance(trajectory, Trajectory):
+        raise ArgumentError("trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory, if it has one)")
+    if not isinstance(problem, Problem):
+        raise ArgumentError("problem", type(problem).__name__, "the Problem that was solved")
     return drive_trajectory(trajectory, problem, engine=engine, picture=picture)
 
 

@@ -6,10 +6,10 @@ import csv
 
 import numpy as np
 import pytest
-from conftest import ROOT, smdw_problem
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from smdw_problems import ROOT, smdw_problem
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.rollout import Kinematics, roll_out, step_grid
@@ -30,7 +30,7 @@ PRINT_ROUNDING = 0.0015
 
 def rows(name):
     lines = [line for line in (DATA / name).read_text().splitlines() if not line.startswith("#")]
-    return [{k: v for k, v in row.items()} for row in csv.DictReader(lines)]
+    return [dict(row) for row in csv.DictReader(lines)]
 
 
 @pytest.mark.parametrize("table", ["table_5_5_time_interval.csv", "table_5_6_repeat_1s.csv"])

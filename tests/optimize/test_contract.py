@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import smdw_problem
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from smdw_problems import smdw_problem
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
 from trajopt.objectives.terminal import terminal_objective
-from trajopt.optimize.base import Budget, Status, better, best_index
+from trajopt.optimize.base import Budget, Status, best_index, better
 from trajopt.optimize.search import OPTIMIZERS, minimize, optimizer_named
 
 GENERAL = [name for name in OPTIMIZERS if Capability.RESIDUALS not in optimizer_named(name).needs]
@@ -134,7 +134,7 @@ def test_failing_objectives_are_counted_and_survived(name, function):
 
 
 def test_an_objective_that_always_fails_says_so():
-    result = minimize(lambda x: float("nan"), BOX, optimizer="pso", budget=Budget(evaluations=200))
+    result = minimize(lambda _: float("nan"), BOX, optimizer="pso", budget=Budget(evaluations=200))
     assert result.status is Status.FAILED
     assert not result.success
     assert result.failures == 200
@@ -152,7 +152,7 @@ def test_objectives_cannot_change_the_search():
 
 
 def test_wrong_shape_is_a_failure():
-    result = minimize(lambda x: np.ones(3), BOX, optimizer="pso", budget=Budget(evaluations=100))
+    result = minimize(lambda _: np.ones(3), BOX, optimizer="pso", budget=Budget(evaluations=100))
     assert result.status is Status.FAILED
     assert "shape" in result.first_failure
 

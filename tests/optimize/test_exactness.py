@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import SMDW, smdw_problem
+from smdw_problems import SMDW, smdw_problem
 
 from trajopt.objectives.terminal import terminal_objective, with_free
 from trajopt.optimize.base import Budget, Status

@@ -122,7 +122,8 @@ def test_doubling_back_is_infeasible_and_says_where():
 
 
 @pytest.mark.parametrize(("points", "what"), [
-    ([[0, 0]], "shape"), ([[0, 0], [np.nan, 1]], "finite"), ([0, 1, 2], "shape"), ([[0, 0, 0, 0], [1, 1, 1, 1]], "shape"),
+    ([[0, 0]], "shape"), ([[0, 0], [np.nan, 1]], "finite"), ([0, 1, 2], "shape"),
+    ([[0, 0, 0, 0], [1, 1, 1, 1]], "shape"),
 ])
 def test_bad_points(points, what):
     with pytest.raises(ArgumentError, match=what):

@@ -30,6 +30,9 @@ def main() -> None:
     except TrajoptError as error:
         Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, highlight=False)
         sys.exit(UNUSABLE)
+    except OSError as error:  # a folder that cannot be made, a full disk: the message names the file
+        Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, highlight=False)
+        sys.exit(UNUSABLE)
     except KeyboardInterrupt:
         Console(stderr=True).print("interrupted")
         sys.exit(130)

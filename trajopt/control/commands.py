@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _SMALL_TURN = 1e-9  # rad in one step below which a step is straight
 _FINE = 0.01  # s between points where speeds are compared; chosen
 LOG_COLUMNS = ("t", "x", "y", "yaw", "v")
+_MOST_COMMANDS = 1_000_000  # of one motion, chosen: a microsecond is no sample time of a drive
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,9 @@ def commands(trajectory: Trajectory, sample_time: float, *, rule: Literal["held"
     """
     if not (np.isfinite(sample_time) and sample_time > 0):
         raise ArgumentError("sample_time", sample_time, "a finite time > 0 s")
+    if trajectory.duration / sample_time > _MOST_COMMANDS:
+        raise ArgumentError("sample_time", sample_time, f"at most {_MOST_COMMANDS:,} commands: "
+                            f"{trajectory.duration / _MOST_COMMANDS:.2g} s or more")
     robot = _robot(trajectory)
     half_track(robot)
     count = max(int(np.ceil(trajectory.duration / sample_time - 1e-9)), 1)

@@ -69,19 +69,17 @@ class DurationObjective:
 
     def evaluate(self, candidates: Array) -> Evaluation:
         """Durations are computed only where the wheel angles are within tolerance: elsewhere Deb's rule
-        compares violations and the path length (m) stands in for the cost."""
+        compares violations and the path length (m) stands in for the cost. Where the limits allow no motion,
+        both are inf."""
         candidates = np.asarray(candidates, dtype=np.float64)
         violation = self._violation(candidates)
-        cost = [self._duration(row, self.gridpoints) if v == 0.0 else self.path(row).length
-                for row, v in zip(candidates, violation, strict=True)]
-        violation = np.where(np.isfinite(cost), violation, violation + 1.0)
-        return Evaluation(np.where(np.isfinite(cost), cost, 1e6), violation)
+        cost = np.array([self._duration(row, self.gridpoints) if v == 0.0 else self.path(row).length
+                         for row, v in zip(candidates, violation, strict=True)])
+        return Evaluation(cost, np.where(np.isfinite(cost), violation, np.inf))
 
     def score(self, candidate: Array) -> Evaluation:
-        violation = self._violation(candidate[None])
         duration = self._duration(candidate, None)
-        if not np.isfinite(duration):
-            return Evaluation(np.array([1e6]), violation + 1.0)
+        violation = self._violation(candidate[None]) if np.isfinite(duration) else np.array([np.inf])
         return Evaluation(np.array([duration]), violation)
 
     def terms(self, candidate: Array) -> dict[str, float]:

@@ -251,7 +251,12 @@ class Run:
         found = [] if self.best_x is None else [np.clip(self.best_x, self.bounds[:, 0], self.bounds[:, 1])]
         best = (self.bounds.mean(axis=1), np.inf, np.inf)
         for x in [*found, *self._proposals]:
-            scored = self.objective.score(x)
+            try:
+                scored = self.objective.score(x)
+            except Exception as error:  # a user's objective may raise here as anywhere
+                self.failures += 1
+                self.first_failure = self.first_failure or f"{type(error).__name__}: {error}"
+                continue
             if better(scored.cost[0], scored.violation[0], best[1], best[2]):
                 best = (x, float(scored.cost[0]), float(scored.violation[0]))
         return best

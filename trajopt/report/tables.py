@@ -32,7 +32,8 @@ def solution_table(solution: Solution) -> Table:
     table.add_row("duration", "none" if solution.trajectory is None else f"{solution.duration:.4f} s")
     _margin_rows(table, solution)
     for name, value in zip(wheel_names(len(solution.dead_zone_effect)), solution.dead_zone_effect, strict=True):
-        if solution.problem.actuator.dead_zone > 0 and name in solution.problem.goal.critical:
+        drives = solution.problem.actuator
+        if drives.dead_zone > 0 and not drives.enabled and name in solution.problem.goal.critical:
             table.add_row(f"dead-zone would add, {name}", f"{value:+.4f} rad" if np.isfinite(value) else "none")
     table.add_row("optimizer", escape(search.optimizer))
     failed = f", {search.failures} failed" if search.failures else ""

@@ -79,8 +79,7 @@ def _compared(trajectory: Trajectory, problem: Problem, recording: Recording) ->
     plan = trajectory.at(np.minimum(recording.times, trajectory.duration))
     error = recording.pose - plan.pose
     distance = np.hypot(error[:, 0], error[:, 1])
-    moving = plan.pose[np.flatnonzero(np.hypot(*(plan.pose[:, :2] - plan.pose[-1, :2]).T) > 0.02)[-1], :2]
-    heading = np.arctan2(*(plan.pose[-1, :2] - moving)[::-1])
+    heading = _final_direction(plan.pose)
     dx, dy = error[-1, :2]
     wheels = recording.wheel_angles[-1] - (np.asarray(problem.start.wheels) + plan.wheel_angles[-1])
     return ValidationReport(
@@ -104,3 +103,10 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
     return values[0], values[1], values[2], values[3]
+
+
+def _final_direction(poses: Array) -> float:
+    """Direction of travel over the last 2 cm (rad), or over the whole motion where it is shorter than that."""
+    before = np.flatnonzero(np.hypot(*(poses[:, :2] - poses[-1, :2]).T) > 0.02)
+    x, y = poses[-1, :2] - poses[before[-1] if before.size else 0, :2]
+    return float(np.arctan2(y, x))

@@ -31,6 +31,7 @@ MOST_ROUNDS = 16  # rounds before giving up on a violation above the largest slo
 LARGEST_SLOWDOWN = 1.001  # of time; DESIGN: at most 0.1 %
 _KEPT = 1e-9  # relative violation that counts as none
 _TIGHTER = (0.0, 1e-4, 1e-3)  # shares taken off all limits, in turn, where slowing down does not help; chosen
+_FASTEST = 1e6  # m/s, chosen: beyond it is an input error, and squares stay far from overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,14 +105,21 @@ def _job(path: Path, limits: Sequence[Limit], robot: Platform | None, terrain: T
     """The checked arguments. Raises ArgumentError."""
     if not isinstance(path, Path):
         raise ArgumentError("path", path, "a Path")
-    if not len(limits):
-        raise ArgumentError("limits", limits, "at least one limit")
+    if isinstance(limits, str) or not isinstance(limits, Sequence) or not len(limits):
+        raise ArgumentError("limits", limits, "a list or tuple of at least one limit")
+    for limit in limits:
+        if not hasattr(limit, "rows") or isinstance(limit, type):
+            raise ArgumentError("limits", limit, "limits, as Speed(1.0)")
+    if robot is not None and not isinstance(robot, Platform):
+        raise ArgumentError("robot", robot, "a Platform, as loc8(), or None")
+    if terrain is not None and not hasattr(terrain, "check"):
+        raise ArgumentError("terrain", terrain, "a terrain, as Flat(), or None")
     names = [limit.name for limit in limits]
     if len(set(names)) < len(names):
         raise ArgumentError("limits", names, "limits with different names (pass name=...)")
     for argument, speed in zip(("start_speed", "end_speed"), speeds, strict=True):
-        if not (np.isfinite(speed) and speed >= 0):
-            raise ArgumentError(argument, speed, "a finite path speed >= 0 m/s")
+        if isinstance(speed, (str, bool)) or not (0 <= speed <= _FASTEST):
+            raise ArgumentError(argument, speed, f"a path speed from 0 to {_FASTEST:g} m/s")
     require_engine(engine)
     places = np.atleast_1d(np.asarray(stops, dtype=np.float64))
     if places.ndim != 1 or not np.all((places > 0) & (places < path.length)):
