@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -41,6 +41,7 @@ NEAREST = 0.004  # m, least gap a trial may start with
 PSO_SEARCHES = 5  # of the thesis's PSO, each serving an equal share of the trials
 PHASES = np.linspace(-2.4, 2.4, 9)  # rad, along the rotation, where the wheel meets the step
 TORQUES, FRICTIONS = (2.0, 4.0, 8.0), (0.5, 0.8)
+SOURCES = ("exact", "thesis PSO", "uniform")
 PACKAGES = ("numpy", "mujoco", "pybullet")
 
 
@@ -117,9 +118,8 @@ def pso_endings(height: float, name: str, searches: int) -> list[tuple[Array, fl
     return found
 
 
-def planned(engine: str, trials: int, workers: int) -> list[Trial]:
-    """Climb rates from the states that planners reach, state errors the same for all."""
-    rows = []
+def planned(engine: str, trials: int, workers: int, sources: Sequence[str] = SOURCES) -> Iterator[list[Trial]]:
+    """Climb rates from the states that planners reach, state errors the same for all; a list a cell."""
     for height, file in FILES.items():
         problem = load_maneuver(PROBLEMS / "smdw" / file)
         for configuration in configurations(problem.robot.wheel, problem.obstacle):
@@ -127,8 +127,9 @@ def planned(engine: str, trials: int, workers: int) -> list[Trial]:
                 continue
             name, plan = NAMES[configuration.name], plan_of(problem, configuration)
             exact = plan.trajectory.at(plan.duration).wheel_angles[0] + np.array(problem.start.wheels)
-            endings = pso_endings(height, name, min(PSO_SEARCHES, trials))
-            for source in ("exact", "thesis PSO", "uniform"):
+            searches = min(PSO_SEARCHES, trials) if "thesis PSO" in sources else 1
+            endings = pso_endings(height, name, searches)
+            for source in sources:
                 climbs = []
                 for n in range(trials):
                     rng = np.random.default_rng([n, round(height * 1e4), list(NAMES.values()).index(name)])
@@ -136,13 +137,12 @@ def planned(engine: str, trials: int, workers: int) -> list[Trial]:
                     pso, turned = endings[n % len(endings)]
                     wheels = {"exact": exact, "thesis PSO": pso, "uniform": random}[source]
                     climbs.append(climb_from(problem, plan, wheels, rng, turned if source == "thesis PSO" else 0.0))
-                rows += _rows("planned", engine, name, source, climbs, climb_all(climbs, engine=engine, workers=workers))
-    return rows
+                outcomes = climb_all(climbs, engine=engine, workers=workers)
+                yield _rows("planned", engine, name, source, climbs, outcomes)
 
 
-def driven(engine: str, trials: int, workers: int) -> list[Trial]:
-    """Climb rates after the exact plan was driven open loop from a start with errors."""
-    rows = []
+def driven(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
+    """Climb rates after the exact plan was driven open loop from a start with errors; a list a cell."""
     for height, file in FILES.items():
         problem = load_maneuver(PROBLEMS / "smdw" / file)
         for configuration in configurations(problem.robot.wheel, problem.obstacle):
@@ -160,9 +160,8 @@ def driven(engine: str, trials: int, workers: int) -> list[Trial]:
                 pose, wheels = reached(recording)
                 climbs.append(replace(climb, pose=_before_step(problem, np.array(pose)), wheels=wheels))
             outcomes = climb_all(climbs, engine=engine, workers=workers)
-            rows += _rows("driven", engine, NAMES[configuration.name], "exact, open loop",
-                          climbs + climbs[:1] * len(lost), outcomes + lost)
-    return rows
+            yield _rows("driven", engine, NAMES[configuration.name], "exact, open loop",
+                        climbs + climbs[:1] * len(lost), outcomes + lost)
 
 
 def approach_command(problem: ManeuverProblem, plan: Plan, rng: Generator) -> Command:
@@ -174,9 +173,8 @@ def approach_command(problem: ManeuverProblem, plan: Plan, rng: Generator) -> Co
                    _four(np.array(problem.start.wheels) + rng.normal(0.0, START_WHEEL_SD, 4)))
 
 
-def phases(engine: str, runs: int, workers: int) -> list[Trial]:
-    """Climbs over the phase at which the leading wheels meet the step, for torques and frictions."""
-    rows = []
+def phases(engine: str, runs: int, workers: int) -> Iterator[list[Trial]]:
+    """Climbs over the phase at which the leading wheels meet the step, for torques and frictions; a list a row."""
     for file in FILES.values():
         problem = load_maneuver(PROBLEMS / "smdw" / file)
         for configuration in configurations(problem.robot.wheel, problem.obstacle):
@@ -188,9 +186,8 @@ def phases(engine: str, runs: int, workers: int) -> list[Trial]:
                               for phase in PHASES for n in range(runs)]
                     outcomes = climb_all(climbs, engine=engine, workers=workers)
                     labels = [f"{phase:+.2f}" for phase in PHASES for _ in range(runs)]
-                    for label, climb, outcome in zip(labels, climbs, outcomes, strict=True):
-                        rows += _rows("phases", engine, NAMES[configuration.name], label, [climb], [outcome])
-    return rows
+                    yield [row for label, climb, outcome in zip(labels, climbs, outcomes, strict=True)
+                           for row in _rows("phases", engine, NAMES[configuration.name], label, [climb], [outcome])]
 
 
 def _at_phase(problem: ManeuverProblem, configuration: Configuration, phase: float, friction: float, torque: float,
@@ -259,26 +256,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--runs", type=int, default=1, help="runs a cell of the phase map")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--parts", nargs="+", default=["planned", "driven", "phases"])
+    parser.add_argument("--sources", nargs="+", default=list(SOURCES), help="planners of part 'planned'")
     given = parser.parse_args(arguments)
     trials, parts = (2, ["planned"]) if given.quick else (given.trials, given.parts)
     name = f"climb_{given.engine}" + ("_quick" if given.quick else "")
-    tables: list[ResultTable] = []
-    rows: list[Trial] = []
+    cells: dict[str, list[Trial]] = {}
     for part in parts:
-        if part == "phases":
-            new = phases(given.engine, given.runs, given.workers)
-            tables.append(phase_table(new))
-        else:
-            new = {"planned": planned, "driven": driven}[part](given.engine, trials, given.workers)
-            tables.append(rate_table("Sub-test 2 from planned states" if part == "planned" else
-                                     "Sub-test 1 open loop, then sub-test 2", new))
-        rows += new
-        _keep(name, rows)
-        publish(name, tables, packages=PACKAGES, notes=[
-            "A wheel is up when its centre stays risen by 0.7 of the step's height over the last 0.2 s. First attempt: "
-            "within half a turn of meeting the step (forward: the leading wheel; lateral: both). Brackets: Wilson, "
-            f"95 %. Friction {FRICTION[0]}-{FRICTION[1]}, 8 N m, unless the row says otherwise. Exploded runs are "
-            "counted apart. Thesis: runs that climbed, in another simulator."])
+        work = {"planned": lambda: planned(given.engine, trials, given.workers, given.sources),
+                "driven": lambda: driven(given.engine, trials, given.workers),
+                "phases": lambda: phases(given.engine, given.runs, given.workers)}[part]()
+        for rows in work:  # written after every cell, so that a run cut short is kept
+            cells.setdefault(part, []).extend(rows)
+            _keep(name, [row for known in cells.values() for row in known])
+    publish(name, [_table(part, rows) for part, rows in cells.items()], packages=PACKAGES, notes=[NOTE])
+
+
+NOTE = ("A wheel is up when its centre stays risen by 0.7 of the step's height over the last 0.2 s. First attempt: "
+        "within half a turn of meeting the step (forward: the leading wheel; lateral: both). Brackets: Wilson, 95 %. "
+        f"Friction {FRICTION[0]}-{FRICTION[1]}, 8 N m, unless the row says otherwise. Exploded runs are counted apart. "
+        "Thesis: runs that climbed, in another simulator.")
+
+
+def _table(part: str, rows: Sequence[Trial]) -> ResultTable:
+    if part == "phases":
+        return phase_table(rows)
+    return rate_table("Sub-test 2 from planned states" if part == "planned" else
+                      "Sub-test 1 open loop, then sub-test 2", rows)
 
 
 def _keep(name: str, rows: Sequence[Trial]) -> None:
