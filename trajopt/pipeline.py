@@ -145,7 +145,7 @@ def validate(trajectory: Trajectory, problem: Problem, *, engine: str = "pybulle
     SimulationError where the simulation leaves physics.
     """
     if not isinstance(trajectory, Trajectory):
-        raise ArgumentError("trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory, if it has one)")
+        raise ArgumentError("trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory has one)")
     if not isinstance(problem, Problem):
         raise ArgumentError("problem", type(problem).__name__, "the Problem that was solved")
     return drive_trajectory(trajectory, problem, engine=engine, picture=picture)
