@@ -24,7 +24,7 @@ STRICT = {"nsz", "contract"}
 MAX_INCREMENT = 0.2  # rad; the first dropped term of the series is below 1e-17 there
 
 
-@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)
 def _turned(c, s, a):  # type: ignore[no-untyped-def]
     """(cos, sin) turned by the small angle a."""
     q = a * a
@@ -33,7 +33,7 @@ def _turned(c, s, a):  # type: ignore[no-untyped-def]
     return c * cos - s * sin, s * cos + c * sin
 
 
-@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)
 def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]
     """Actuator.step_mean on scalars, without branches."""
     low, high = mean - half, mean + half
@@ -47,9 +47,9 @@ def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]
     return single if small else total / (1.0 if small else span)
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)  # type: ignore[untyped-decorator]
-def _kernel(node, rate, g0, g1, g2, r0, r1, r2, weights, width, inverse, forward, sat, dz,
-            x, y, yaw, duration, out):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
+def _kernel(  # type: ignore[no-untyped-def]
+        node, rate, g0, g1, g2, r0, r1, r2, weights, width, inverse, forward, sat, dz, x, y, yaw, duration, out):
     """Fill ``out`` (3 + 4, n) with final x, y, yaw and the wheel travel of n candidates (four wheels)."""
     steps, n = g0.shape[0], x.shape[1]
     c, s, ang = np.empty(n), np.empty(n), np.empty(n)
@@ -157,7 +157,9 @@ def roll_out_swarm(grid: StepGrid, kinematics: Kinematics, actuator: Actuator, x
     full = [np.ascontiguousarray(np.broadcast_to(a, (4, n))) for a in (x, y, yaw)]
     out = np.empty((7, n))
     saturation = min(actuator.saturation, 1e300)  # inf would give inf - inf
-    _kernel(grid.node_value, grid.node_rate, *grid.gauss_value, *grid.gauss_rate, GAUSS_WEIGHTS, grid.width,
-            kinematics.inverse, kinematics.forward, saturation, actuator.dead_zone, *full,
+    g0, g1, g2 = grid.gauss_value
+    r0, r1, r2 = grid.gauss_rate
+    _kernel(grid.node_value, grid.node_rate, g0, g1, g2, r0, r1, r2, GAUSS_WEIGHTS, grid.width, kinematics.inverse,
+            kinematics.forward, saturation, actuator.dead_zone, full[0], full[1], full[2],
             np.ascontiguousarray(np.broadcast_to(np.ravel(duration), (n,)), dtype=np.float64), out)
     return out

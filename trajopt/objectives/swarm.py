@@ -30,7 +30,7 @@ _ROWS = 17
 _SUMS = 10  # first row that is added up over the steps
 
 
-@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)
 def _step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
     """Actuator.step_mean in wheel travel: mean d, half-span h, limits as travel a step.
 
@@ -45,7 +45,7 @@ def _step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
     return total / (high - low)
 
 
-@numba.njit(inline="always", fastmath=STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(inline="always", fastmath=STRICT)
 def _turned(c, s, a):  # type: ignore[no-untyped-def]
     """(cos, sin) turned by the small angle a."""
     q = a * a
@@ -54,7 +54,7 @@ def _turned(c, s, a):  # type: ignore[no-untyped-def]
     return c * cos - s * sin, s * cos + c * sin
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
 def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
     """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in place."""
     i00, i01, i10, i11 = inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1]
@@ -101,7 +101,7 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
             st[_SUM_Y + j] += s * mx + c * my
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy")
 def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` (7, n) for candidates ``z`` (n, d): final x, y, yaw and the travel of four wheels.
 
@@ -126,7 +126,7 @@ def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type:
                 out[r, first + j] = start[r] + st[(_SUMS + r) * LANES + j]
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy")
 def _costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type: ignore[no-untyped-def]
     """Table 4.4 of thesis 000 from final states ``end`` (7, n)."""
     for i in range(end.shape[1]):

@@ -11,7 +11,7 @@ import numpy as np
 from trajopt.optimize.base import FEASIBLE
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy")
 def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[no-untyped-def]
     """Update own bests in place by Deb's rule; the index of the swarm's best."""
     n, d = x.shape
@@ -36,7 +36,7 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
     return best
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy")
 def move(x, v, own, leader, r, inertia, cognitive, social, low, high, limit):  # type: ignore[no-untyped-def]
     """Velocities and positions after one iteration, in place; how many coordinates lie outside."""
     n, d = x.shape
