@@ -46,7 +46,7 @@ Array = NDArray[np.float64]
 THESIS_ALPHAS = (math.radians(35.0), math.radians(45.0))  # rad, thesis 000 section 4.1.6, either sign
 LARGEST_TURN = math.pi / 2  # rad, thesis 000 section 4.1.6: "does not exceed a quarter turn"
 TIMED_CANDIDATES = 2  # paths that are time-scaled for each configuration, chosen
-RANKING_GRID = 40  # gridpoints of the time scaling that ranks candidates, chosen; the plan's own grid is the default
+RANKING_GRID = 40  # gridpoints of the time scaling that ranks candidates, chosen; plans get the default grid
 WHEEL_TOLERANCE = 1e-6  # rad, of the critical wheels before physics
 # Sideways shifts (shares of the distance to the goal) of P1 and P2 around which exact paths are looked for: first a
 # few, then many; chosen.
