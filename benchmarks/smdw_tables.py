@@ -184,7 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     publish("smdw_tables" + ("_quick" if quick else ""), tables, packages=("numpy", "mujoco"), notes=[
         "Tables 5.5, 5.6: saturation 43 rad/s and dead-zone 2.8 rad/s are inferred, so short intervals agree in kind "
         "only. From T = 3 s on the table is not reproduced: the thesis prints 2.0-3.8, its PSO on a sound "
-        "actuator model finds less; its search was stuck or its actuator differed. The exact planner may also move P1 and the "
+        "actuator model finds less: its search stuck or its actuator differed. The exact planner may move P1 and the "
         "heading, so its column is no like-for-like claim; where wheels saturate throughout it has no solution.",
         "Contact offsets printed at 30 and 60 deg need Rc 10.29 and Re 5.54 cm, whose Rc - Re = 4.75 cm rules out the "
         "5 cm step that the thesis climbs; the default keeps its rolling radius and takes Re so that 5 cm passes.",

@@ -52,7 +52,7 @@ WHEEL_TOLERANCE = 1e-6  # rad, of the critical wheels before physics
 # few, then many; chosen.
 _FEW_BULGES = ((0.0, 0.0), (0.2, 0.0), (-0.2, 0.0), (0.0, 0.2), (0.0, -0.2), (0.2, 0.2), (-0.2, -0.2))
 _MANY_BULGES = tuple((a / 5, b / 5) for a in range(-3, 4) for b in range(-3, 4))
-# Share of trials that brought both leading wheels up: MuJoCo, friction 0.6-1, 8 N m, wheel angles at the window's middle
+# Share of trials with both leading wheels up: MuJoCo, friction 0.6-1, 8 N m, wheel angles at the window's middle
 # with errors of 3 mm, 0.5 deg, 0.05 rad: 20 of 20 for each (lateral), 40 of 40 (forward 35 and 45 deg);
 # benchmarks/climb.py. Written as (successes + 1)/(trials + 2), so that no rate is certain.
 CLIMB_RATES = {(False, 0.035): 41 / 42, (False, 0.05): 41 / 42, (True, 0.035): 21 / 22, (True, 0.05): 21 / 22}
