@@ -24,15 +24,13 @@ from trajopt.timing.trajectory import Trajectory
 Array = NDArray[np.float64]
 Mode = Literal["pose and phase", "pose", "open loop"]
 
-RESOLVE_EVERY = 0.1  # s between re-solves, SOURCES (prototype); so are the next ones unless marked
+RESOLVE_EVERY = 0.1  # s between re-solves, from a prototype of this law; so are the next ones unless marked
 LAST_RESOLVE = 0.3  # s before the end from which on the reference stays
 SERVO_GAIN = 10.0  # 1/s, of the wheel position servo
 WHEEL_WEIGHT = 0.015  # rad, residual of a critical wheel that counts 1
 BEND_WEIGHT = 0.1  # of the remaining length (m), and of the smaller of 1 rad and L/0.5 m: bend that counts 1
 END_WEIGHT = (0.002, 0.002, math.radians(0.2))  # m, m, rad: pose given up at the end that counts 1
-GAIN_SD = 0.03  # of travel, standard deviation of the steady loss through rollers (accuracy of the simulated wheels)
 ODOMETRY_NOISE = 0.06  # of the travel of a step, standard deviation: twice the 3 % of the simulators' error
-START_SD = np.array([0.01, 0.01, math.radians(1.0)])  # m, m, rad: how well the start is known, chosen
 LEAST_TURN = math.radians(30.0)  # rad; with less turn the phase can hardly be corrected
 SAMPLES = 241  # of a trajectory, chosen: 15 ms on 3.5 s
 _STEP = 1e-5  # m or rad, for difference quotients
@@ -76,19 +74,10 @@ class Reference:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Pose (3,), the shares of forward and sideways travel that wheels gain over odometry (2,), covariance (5, 5).
-
-    Rollers lose a steady 1-3 % of travel; a filter without these shares lags behind by several millimetres.
-    """
+    """Pose (3,) and its covariance (3, 3)."""
 
     pose: Array
-    gain: Array
     covariance: Array
-
-
-def estimate_at(pose: Array, deviations: Array) -> Estimate:
-    """Estimate at a pose (3,) known within standard deviations (3,): m, m, rad."""
-    return Estimate(pose, np.zeros(2), np.diag(np.concatenate([deviations, [GAIN_SD, GAIN_SD]]) ** 2))
 
 
 def reference_of(trajectory: Trajectory, wheels: Array) -> Reference:
@@ -102,27 +91,23 @@ def reference_of(trajectory: Trajectory, wheels: Array) -> Reference:
 def predict(estimate: Estimate, robot: Platform, turned: Array) -> Estimate:
     """Estimate after the wheels turned by ``turned`` (W,) rad (odometry)."""
     step = robot.forward @ turned
-    ahead, aside, turn = step * np.append(1.0 + estimate.gain, 1.0)
-    yaw = estimate.pose[2] + turn / 2
+    yaw = estimate.pose[2] + step[2] / 2
     cos, sin = math.cos(yaw), math.sin(yaw)
-    moved = np.array([cos * ahead - sin * aside, sin * ahead + cos * aside, turn])
-    slope = np.eye(5)
+    moved = np.array([cos * step[0] - sin * step[1], sin * step[0] + cos * step[1], step[2]])
+    slope = np.eye(3)
     slope[0, 2], slope[1, 2] = -moved[1], moved[0]
-    slope[:2, 3:] = np.array([[cos, -sin], [sin, cos]]) * step[:2]
-    travel = math.hypot(ahead, aside) + robot.turning_length * abs(turn)
-    noise = ODOMETRY_NOISE * travel * np.array([1.0, 1.0, 1.0 / robot.turning_length, 0.0, 0.0])
-    return Estimate(estimate.pose + moved, estimate.gain, slope @ estimate.covariance @ slope.T + np.diag(noise**2))
+    travel = math.hypot(moved[0], moved[1]) + robot.turning_length * abs(moved[2])
+    noise = ODOMETRY_NOISE * travel * np.array([1.0, 1.0, 1.0 / robot.turning_length])
+    return Estimate(estimate.pose + moved, slope @ estimate.covariance @ slope.T + np.diag(noise**2))
 
 
 def correct(estimate: Estimate, measured: Array, sensors: Sensors) -> Estimate:
     """Estimate after a pose measurement (3,)."""
     noise = np.diag(np.maximum([sensors.position, sensors.position, sensors.yaw], 1e-6) ** 2)
-    before = estimate.covariance
-    weight = before[:, :3] @ np.linalg.inv(before[:3, :3] + noise)
+    gain = estimate.covariance @ np.linalg.inv(estimate.covariance + noise)
     error = measured - estimate.pose
     error[2] = (error[2] + math.pi) % (2 * math.pi) - math.pi
-    change = weight @ error
-    return Estimate(estimate.pose + change[:3], estimate.gain + change[3:], before - weight @ before[:3])
+    return Estimate(estimate.pose + gain @ error, (np.eye(3) - gain) @ estimate.covariance)
 
 
 def wheel_path(robot: Platform, pose: Array) -> Array:
@@ -243,7 +228,7 @@ def approach_controller(trajectory: Trajectory, robot: Platform, wheels: Array, 
     """
     reference = reference_of(trajectory, wheels)
     goal = Goal(reference.pose[-1], reference.wheels[-1], critical, cap)
-    start = estimate_at(reference.pose[0], START_SD)
+    start = Estimate(reference.pose[0], np.diag([0.01, 0.01, math.radians(1.0)]) ** 2)
     return ApproachController(robot, reference, goal, start, Sensors() if sensors is None else sensors, mode, rng)
 
 
