@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from trajopt.cli.bench import app
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import Budget
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 from trajopt.report.bench import write_report
 from trajopt.study.bench import BenchPlan, best_costs, load_bench, run_bench
-from trajopt.study.bench_commands import app
 from trajopt.study.bench_problems import bench_problem
 from trajopt.study.bench_tables import BenchTables
 from trajopt.study.profiles import (

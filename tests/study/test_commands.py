@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from tests.study.crashes import cases
 from tests.study.run_functions import mixed
-from trajopt.study.commands import app
+from trajopt.cli.sweep import app
 from trajopt.study.store import Store
 from trajopt.study.sweeps import sweep
 

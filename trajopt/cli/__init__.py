@@ -7,18 +7,16 @@ import sys
 import typer
 from rich.console import Console
 
-from trajopt.cli import maneuvers, paths, search
+from trajopt.cli import bench, maneuvers, paths, search, sweep
 from trajopt.errors import TrajoptError
-from trajopt.study.bench_commands import app as bench
-from trajopt.study.commands import app as sweep
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Plan, time and check motions of wheeled ground robots.")
 for command in (search.solve, search.validate, maneuvers.plan, paths.explain, paths.export, paths.compare,
                 search.schema):
     app.command()(command)
-app.add_typer(bench, name="bench")
-app.add_typer(sweep, name="sweep")
+app.add_typer(bench.app, name="bench")
+app.add_typer(sweep.app, name="sweep")
 
 UNUSABLE = 2
 

@@ -120,7 +120,6 @@ class _Program:
         """Write the objective in symbols and hand it to IPOPT."""
         import casadi as ca
 
-        ca.GlobalOptions.setNumpyMode(1)
         middle = run.bounds.mean(axis=1)
         parameters, slacks = objective.parameters_at(middle), objective.slacks_at(middle)
         z = ca.MX.sym("z", run.objective.dimension + len(slacks))
@@ -164,12 +163,18 @@ class _Program:
 
 
 def _in_symbols(objective: SymbolicObjective, z: Any, p: Any) -> SymbolicProblem:
+    import casadi as ca
+
+    before = ca.GlobalOptions.getNumpyMode()
+    ca.GlobalOptions.setNumpyMode(1)  # NumPy functions run on symbols; only here, since the switch is global
     try:
         return objective.symbolic(z, p)
     except Exception as error:  # whatever a user's function raises on symbols
         raise ArgumentError("objective", f"{type(error).__name__}: {error}", "a function written with NumPy "
                             "functions and arithmetic on its components, so that it runs on CasADi symbols; "
                             "take slsqp or pso otherwise") from error
+    finally:
+        ca.GlobalOptions.setNumpyMode(before)
 
 
 def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:

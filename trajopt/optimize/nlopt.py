@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -37,11 +38,11 @@ class NLopt:
     tolerance: float = 1e-12  # bobyqa's relative tolerance on the variables; tight, because budgets end searches
 
     @property
-    def name(self) -> str:  # type: ignore[override]
+    def name(self) -> str:
         return self.method
 
     @property
-    def stochastic(self) -> bool:  # type: ignore[override]
+    def stochastic(self) -> bool:
         return self.method == "bobyqa"
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
@@ -86,10 +87,9 @@ class NLopt:
             search.set_maxeval(min(run.remaining() + 1, 10_000_000))
             search.set_initial_step(_STEP)
             first = np.full(d, 0.5) if x0 is None else (x0 - low) / width
-            try:
+            # Why a search was stopped is in ``ended``; one that ran out of digits is just over.
+            with suppress(package.ForcedStop, package.RoundoffLimited, RuntimeError):
                 search.optimize(first if index == 0 else rng.random(d))
-            except (package.ForcedStop, package.RoundoffLimited, RuntimeError):
-                pass  # why it ended is in ``ended``; a search that ran out of digits is just over
             if ended:
                 raise ended[0]
             run.nit += 1

@@ -56,7 +56,7 @@ class ScipyLocal:
     tolerance: float = 1e-12  # SciPy's tol; tight, because budgets end searches here
 
     @property
-    def name(self) -> str:  # type: ignore[override]
+    def name(self) -> str:
         return self.method.lower()
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
@@ -198,7 +198,8 @@ class LeastSquares:
 
             def weighted(x: Array, turns: Array = turns) -> Array:
                 run.spend(1)
-                return gains * np.array([float(np.squeeze(v)) for v in objective.residuals(x[:, None], turns)])
+                values = [float(np.squeeze(v)) for v in objective.residuals(x[:, None], turns)]
+                return np.asarray(gains * np.array(values))
 
             # SciPy asks for a start strictly inside.
             inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
-import typer
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -93,15 +92,12 @@ def pairs(frame: pd.DataFrame, columns: Sequence[str]) -> Figure:
     return figure
 
 
-def plot(store: Annotated[Path, typer.Argument(help="store of a sweep (its directory)", show_default=False)],
-         out: Annotated[Path, typer.Argument(help="picture to write (*.png)")],
-         value: Annotated[str, typer.Option(help="result to show")] = "",
-         x: Annotated[str, typer.Option(help="column along x")] = "",
-         y: Annotated[str, typer.Option(help="column along y: a heat map")] = "",
-         by: Annotated[str, typer.Option(help="a line for each of its values")] = "",
-         pair: Annotated[list[str] | None, typer.Option("--pair", help="column of a picture of pairs; repeat")] = None,
-         ) -> None:
-    """Draw a sweep: --x --y --value (heat map), --x --value [--by] (lines), or --pair twice or more."""
+def draw(store: Path, out: Path, *, value: str = "", x: str = "", y: str = "", by: str = "",
+         pair: Sequence[str] | None = None) -> None:
+    """Save a picture of a sweep's store: x, y and value (heat map), x and value (lines), or pairs of columns.
+
+    Raises ArgumentError for any other choice of columns.
+    """
     frame = open_store(store, create=False).frame()
     if pair:
         figure = pairs(frame, pair)
@@ -112,7 +108,6 @@ def plot(store: Annotated[Path, typer.Argument(help="store of a sweep (its direc
     else:
         raise ArgumentError("options", None, "--x --y --value, --x --value [--by], or --pair twice or more")
     figure.savefig(out, dpi=DOTS)
-    typer.echo(f"written to {out}")
 
 
 def _done(frame: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:

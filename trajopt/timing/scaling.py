@@ -105,7 +105,7 @@ def _job(path: Path, limits: Sequence[Limit], robot: Platform | None, terrain: T
     """The checked arguments. Raises ArgumentError."""
     if not isinstance(path, Path):
         raise ArgumentError("path", path, "a Path")
-    if isinstance(limits, str) or not isinstance(limits, Sequence) or not len(limits):
+    if not isinstance(limits, (list, tuple)) or not limits:
         raise ArgumentError("limits", limits, "a list or tuple of at least one limit")
     for limit in limits:
         if not hasattr(limit, "rows") or isinstance(limit, type):

@@ -161,6 +161,21 @@ def export(store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.c
     console.print(f"written to {out}")
 
 
+@app.command()
+def plot(store: StorePath, out: Annotated[Path, typer.Argument(help="picture to write (*.png)")],
+         value: Annotated[str, typer.Option(help="result to show")] = "",
+         x: Annotated[str, typer.Option(help="column along x")] = "",
+         y: Annotated[str, typer.Option(help="column along y: a heat map")] = "",
+         by: Annotated[str, typer.Option(help="a line for each of its values")] = "",
+         pair: Annotated[list[str] | None, typer.Option("--pair", help="column of a picture of pairs; repeat")] = None,
+         ) -> None:
+    """Draw a sweep: --x --y --value (heat map), --x --value [--by] (lines), or --pair twice or more."""
+    from trajopt.report.sweeps import draw
+
+    draw(store, out, value=value, x=x, y=y, by=by, pair=pair)
+    console.print(f"written to {out}")
+
+
 def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> None:
     from trajopt.study.store import open_store
     from trajopt.study.sweeps import missing, sweep
