@@ -70,6 +70,7 @@ def test_budget_of_evaluations_is_kept(name, limit):
 
 @pytest.mark.parametrize("name", GENERAL)
 def test_budget_of_seconds_ends_the_search(name):
+    minimize(rosenbrock, BOX, optimizer=name, budget=Budget(evaluations=10))  # loads its package
     result = minimize(rosenbrock, BOX, optimizer=name, budget=Budget(evaluations=None, seconds=0.2))
     assert result.seconds < 2.0
 

@@ -110,7 +110,9 @@ def test_retry_failed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_stopping_keeps_finished_cases(tmp_path: Path, number: int) -> None:
+    # A shell that starts the tests in the background makes them ignore Ctrl-C; the program under test must not.
     program = (f"import signal; signal.signal(signal.SIGTERM, signal.default_int_handler)\n"
+               f"signal.signal(signal.SIGINT, signal.default_int_handler)\n"
                f"from tests.study.crashes import cases; from tests.study.run_functions import paced\n"
                f"from trajopt.study.sweeps import sweep\n"
                f"sweep(cases(4000), paced, executor=2, store={str(tmp_path / 'store')!r})")
