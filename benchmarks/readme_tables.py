@@ -1,0 +1,80 @@
+"""Tables of README.md from the last benchmark runs: `python -m benchmarks.readme_tables`.
+
+Run first: `python -m benchmarks.optimizers`, `python -m benchmarks.time_scaling`,
+`python -m benchmarks.swarm_speed`. The tables stand between markers in README.md.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+README, RESULTS = Path("README.md"), Path("out/benchmarks")
+START, END = "<!-- tables: python -m benchmarks.readme_tables -->", "<!-- end of tables -->"
+
+
+def peers() -> list[str]:
+    """Speed beside the peers', each pair measured in one run."""
+    timing, swarm = (pd.read_csv(RESULTS / f"{name}.csv") for name in ("time_scaling", "swarm_speed"))
+    rows = ["| work | trajopt | peer | ratio |", "|---|---|---|---|"]
+    for title, group in timing.dropna(subset=["ms"]).groupby("table", sort=False):
+        ours = group[group["engine"] == "compiled"]["ms"]
+        if ours.empty:
+            continue
+        for engine in ("toppra (seidel)", "copp-py"):
+            other = group[group["engine"] == engine]["ms"]
+            if len(other) and not str(title).startswith("time_scale"):
+                rows.append(_row(f"time scaling, {title}", ours.iloc[0], engine, other.iloc[0], "ms"))
+    batch = swarm[(swarm["free"] == "p2")].iloc[0]
+    rows.append(_row("one batch of 50 particles, 252 steps", batch["evaluate"], "the same in NumPy", batch["NumPy"],
+                     "ms"))
+    whole = swarm.dropna(subset=["search"]).set_index("search")["seconds"]
+    rows.append(_row("PSO, 50 particles x 500", whole["trajopt pso"], "pyswarms on the NumPy objective",
+                     whole["pyswarms, NumPy objective"], "s"))
+    alone = swarm.dropna(subset=["package"]).set_index("package")["seconds"]
+    for name in ("pyswarms", "pymoo"):
+        rows.append(_row("PSO's own overhead, 40 x 20-D x 500", alone["trajopt pso, history kept"], name, alone[name],
+                         "s"))
+    runs = [frame["run"].dropna().iloc[0] for frame in (timing, swarm)]
+    return [*rows, "", *(f"Measured {run}." for run in runs)]
+
+
+def _row(work: str, ours: float, peer: str, theirs: float, unit: str) -> str:
+    return f"| {work} | {ours:.3g} {unit} | {peer}: {theirs:.3g} {unit} | {theirs / ours:.3g} |"
+
+
+def optimizers() -> list[str]:
+    """Every optimizer on every problem: median and worst cost, and the whole table folded away."""
+    frame = pd.read_csv(RESULTS / "optimizers.csv")
+    lines: list[str] = []
+    for title in frame.dropna(subset=["optimizer"])["table"].unique():
+        part = frame[frame["table"] == title].dropna(subset=["optimizer"])
+        free = ", ".join(sorted(set(part["free"])))
+        lines += ["", f"**{title}** ({free} free, {part['problem'].nunique()} problems)", "",
+                  "| optimizer | problems <= 1e-7 | median cost | worst cost | median evaluations | median seconds |",
+                  "|---|---|---|---|---|---|"]
+        for name, group in part.groupby("optimizer", sort=False):
+            cost, used = group["cost"], f"{group['evaluations'].median():.0f} | {group['seconds'].median():.3f}"
+            lines.append(f"| {name} | {(cost <= 1e-7).sum()} | {cost.median():.1e} | {cost.max():.1e} | {used} |")
+    lines += ["", "<details><summary>All optimizers on all problems</summary>", "",
+              "| actuators | problem | free | optimizer | cost | violation | evaluations | seconds |",
+              "|---|---|---|---|---|---|---|---|"]
+    for row in frame.dropna(subset=["optimizer"]).itertuples():
+        drives = "ideal" if "Without" in row.table else "limited"
+        figures = f"{row.cost:.1e} | {row.violation:.0e} | {row.evaluations:.0f} | {row.seconds:.3f}"
+        lines.append(f"| {drives} | {row.problem} | {row.free} | {row.optimizer} | {figures} |")
+    return [*lines, "", "</details>", "", f"Measured {frame['run'].dropna().iloc[0]}."]
+
+
+def main() -> None:
+    """Rewrite the tables in README.md."""
+    text = README.read_text(encoding="utf-8")
+    before, rest = text.split(START)
+    after = rest.split(END)[1]
+    README.write_text("\n".join([before + START, "", *peers(), *optimizers(), END + after]), encoding="utf-8")
+    print(f"wrote the tables of {README}")
+
+
+if __name__ == "__main__":
+    main()
