@@ -9,7 +9,7 @@ thesis 004, Appendix 1). Plain NumPy on the matrices; the same matrices multiply
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,6 +106,7 @@ class SplineBasis:
         return np.stack(parts, axis=1)
 
 
+@lru_cache(maxsize=32)
 def uniform_basis(points: int) -> SplineBasis:
     """Natural spline on knots 1, 2, ..., ``points``: thesis 000's parametrisation for four points."""
     return SplineBasis(tuple(float(i) for i in range(1, points + 1)))
