@@ -89,6 +89,7 @@ def test_replace_takes_sections_and_dotted_keys(scenario):
     assert changed.actuator.enabled
     assert changed.actuator.saturation == scenario.actuator.saturation
     assert not scenario.actuator.enabled
+    assert scenario.replace(**{"goal.wheels": [0, 0, 0, 1]}).goal == changed.goal
 
 
 def test_replace_takes_arrays_and_sections(scenario):

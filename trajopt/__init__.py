@@ -17,6 +17,14 @@ if TYPE_CHECKING:
         SimulationError,
         TrajoptError,
     )
+    from trajopt.limits.acceleration import Acceleration
+    from trajopt.limits.slip import Slip
+    from trajopt.limits.speed import Speed
+    from trajopt.limits.speed_bound import SpeedZones
+    from trajopt.limits.tip import Tip
+    from trajopt.limits.wheel_acceleration import WheelAcceleration
+    from trajopt.limits.wheel_speed import WheelSpeed
+    from trajopt.limits.yaw_rate import YawRate
     from trajopt.maneuver_problem import load_maneuver
     from trajopt.optimize.base import Budget, OptimizeResult, Status
     from trajopt.optimize.search import minimize
@@ -24,6 +32,8 @@ if TYPE_CHECKING:
     from trajopt.paths.path import Path
     from trajopt.pipeline import Solution, solve, time_path, validate
     from trajopt.problem import Problem, load_problem
+    from trajopt.robots.loc8 import loc8
+    from trajopt.robots.powerbot import powerbot
     from trajopt.simulate.check import ValidationReport
     from trajopt.timing.scaling import time_scale
     from trajopt.timing.trajectory import State, Trajectory
@@ -33,6 +43,16 @@ __version__ = "0.1.0"
 
 # public name -> the module it lives in
 _HOME = {
+    "Acceleration": "trajopt.limits.acceleration",
+    "Slip": "trajopt.limits.slip",
+    "Speed": "trajopt.limits.speed",
+    "SpeedZones": "trajopt.limits.speed_bound",
+    "Tip": "trajopt.limits.tip",
+    "WheelAcceleration": "trajopt.limits.wheel_acceleration",
+    "WheelSpeed": "trajopt.limits.wheel_speed",
+    "YawRate": "trajopt.limits.yaw_rate",
+    "loc8": "trajopt.robots.loc8",
+    "powerbot": "trajopt.robots.powerbot",
     "ArgumentError": "trajopt.errors",
     "Budget": "trajopt.optimize.base",
     "Flat": "trajopt.world.terrain",
@@ -61,6 +81,7 @@ _HOME = {
 }
 
 __all__ = [
+    "Acceleration",
     "ArgumentError",
     "Budget",
     "Flat",
@@ -71,17 +92,26 @@ __all__ = [
     "Problem",
     "ProblemError",
     "SimulationError",
+    "Slip",
     "Solution",
+    "Speed",
+    "SpeedZones",
     "State",
     "Status",
     "Step",
+    "Tip",
     "Trajectory",
     "TrajoptError",
     "ValidationReport",
+    "WheelAcceleration",
+    "WheelSpeed",
+    "YawRate",
     "load_maneuver",
     "load_path_problem",
     "load_problem",
+    "loc8",
     "minimize",
+    "powerbot",
     "solve",
     "time_path",
     "time_scale",

@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 MARGIN = -1e-9  # least relative margin of a trajectory that keeps its limits
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Solution:
     """What ``solve`` found, everything recomputed from the control points.
 
@@ -50,6 +50,10 @@ class Solution:
     wheel_deviation: Array
     dead_zone_effect: Array
     wall_time: float
+
+    def __repr__(self) -> str:
+        return (f"Solution({self.problem.title!r}, cost={self.cost:.3g}, duration={self.duration:.4g} s, "
+                f"holds={self.holds}, optimizer={self.search.optimizer!r})")
 
     @property
     def cost(self) -> float:

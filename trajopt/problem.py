@@ -230,7 +230,9 @@ class Problem(Section):
         for key, value in (changes or {}).items():
             set_key(data, key.split("."), value, self.source)
         for name, value in sections.items():
-            if isinstance(value, Mapping) and isinstance(data.get(name), dict):
+            if "." in name:  # replace(**{"goal.wheels": ...})
+                set_key(data, name.split("."), value, self.source)
+            elif isinstance(value, Mapping) and isinstance(data.get(name), dict):
                 data[name].update(value)
             else:
                 data[name] = value
@@ -257,7 +259,8 @@ def load_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = Non
 
 
 # table that marks another kind of problem file -> the function that reads it
-OTHER_KINDS = {"path": "trajopt.load_path_problem", "obstacle": "trajopt.load_maneuver"}
+OTHER_KINDS = {"path": "trajopt.load_path_problem (command line: trajopt explain)",
+               "obstacle": "trajopt.load_maneuver (command line: trajopt plan)"}
 
 
 def problem_kind(path: str | FilePath) -> str:

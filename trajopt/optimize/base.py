@@ -98,7 +98,7 @@ class OptimizeResult:
     status: Status
     message: str
     optimizer: str
-    history: History
+    history: History = field(repr=False)
     seconds: float
     failures: int = 0
     first_failure: str = ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +39,8 @@ class ValidationReport:
     path_max: float
     length: float
     real_time_factor: float
-    planned: Array
-    recording: Recording
+    planned: Array = field(repr=False)
+    recording: Recording = field(repr=False)
 
     @property
     def final_distance(self) -> float:
