@@ -119,15 +119,15 @@ def _bullet() -> Any:
     """The pybullet module, loaded without the build time that it prints when first imported."""
     if "pybullet" in sys.modules and sys.modules["pybullet"] is not None:
         return sys.modules["pybullet"]
-    sys.stdout.flush()
-    kept, silent = os.dup(1), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(silent, 1)  # the message comes from C, past sys.stdout
+    sys.stderr.flush()
+    kept, silent = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silent, 2)  # the message comes from C, past sys.stderr
     try:
         import pybullet
     except ImportError as error:
         raise MissingDependencyError("pybullet", "simulate", "the physics engine 'pybullet'") from error
     finally:
-        os.dup2(kept, 1)
+        os.dup2(kept, 2)
         os.close(kept)
         os.close(silent)
     return pybullet
