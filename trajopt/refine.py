@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
+from trajopt.optimize.ipopt import numpy_on_symbols, smooth_table, solve_program, stacked, variables
 from trajopt.paths.samples import sample_path
 from trajopt.timing.stages import Stages, assemble
 from trajopt.timing.trajectory import Trajectory
@@ -103,10 +104,9 @@ def limit_jerk(trajectory: Trajectory, jerk: float, *, nodes: int = 150, limits:
                                      f"{best.slowdown:.3g} on time (least margin {margin:.2g}); take more nodes")
 
 
+@numpy_on_symbols(False)
 def _solve(trajectory: Trajectory, limits: tuple[Limit, ...], jerk: float, nodes: int,
            tolerance: float) -> tuple[Array, Array, Array, Array, float, int]:
-    from trajopt.optimize.ipopt import smooth_table, solve_program, stacked, variables
-
     length, top = trajectory.path.length, float(trajectory.sd.max())
     grid = np.linspace(0.0, length, TABLE_POINTS)
     rows = _rows(trajectory, limits, grid)

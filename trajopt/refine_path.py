@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.limits.limit import Limit
+from trajopt.optimize.ipopt import matrix, numpy_on_symbols, solve_program, stacked, total, variables
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
 from trajopt.robots.platform import Platform
@@ -123,11 +124,10 @@ class _Linearised:
     cap: tuple[Array, Array]  # 1 / largest s'^2
 
 
+@numpy_on_symbols(False)
 def _step(build: Builder, used: Callable[[Path], Sequence[Limit]], robot: Platform | None, now: Trajectory,
           z: Array, box: Array, radius: float) -> Array:
     """The control variables that the linearised program likes best within ``radius`` of z."""
-    from trajopt.optimize.ipopt import matrix, solve_program, stacked, total, variables
-
     path = now.path
     places = np.linspace(0.0, path.length, GRID_CELLS + 1)
     u = np.unique(np.concatenate([path.locate(places), np.asarray(path.basis.knots)]))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.limits.speed_bound import SpeedProfile
-from trajopt.optimize.ipopt import solve_program, stacked, total, variables
+from trajopt.optimize.ipopt import numpy_on_symbols, solve_program, stacked, total, variables
 from trajopt.paths.path import Path
 from trajopt.robots.platform import Platform
 from trajopt.timing.scaling import time_scale
@@ -71,6 +71,7 @@ def follow(path: Path, profile: SpeedProfile, limits: Sequence[Limit], *, robot:
     return _least_squares(path, profile, tuple(limits), robot, Flat() if terrain is None else terrain, warm)
 
 
+@numpy_on_symbols(False)
 def _least_squares(path: Path, profile: SpeedProfile, limits: tuple[Limit, ...], robot: Platform | None,
                    terrain: Terrain, warm: Trajectory) -> Followed:
     places = np.unique(np.concatenate([np.linspace(0.0, path.length, _CELLS + 1), np.asarray(profile.places)]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -85,3 +86,20 @@ def test_least_squares_is_closer_than_below() -> None:
         errors[manner] = np.trapezoid((found.trajectory.sd**2 - found.wanted**2) ** 2, found.trajectory.s)
     assert errors["least_squares"] < errors["below"]
     assert math.isfinite(errors["below"])
+
+
+def test_programs_do_not_depend_on_casadis_global_numpy_switch() -> None:
+    """Users may switch CasADi's NumPy mode on for their own models: ours must read and leave it as it was."""
+    path = Path.through([[0, 0], [6, 0]])
+    profile = SpeedProfile((0.0, 6.0), (0.9, 0.4))
+    limits = (Speed(1.0), Acceleration(0.3, 0.3))
+    before = ca.GlobalOptions.getNumpyMode()
+    found = []
+    try:
+        for mode in (0, 1):
+            ca.GlobalOptions.setNumpyMode(mode)
+            found.append(follow(path, profile, limits, manner="least_squares").trajectory.sd)
+            assert ca.GlobalOptions.getNumpyMode() == mode
+    finally:
+        ca.GlobalOptions.setNumpyMode(before)
+    np.testing.assert_array_equal(found[0], found[1])

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from trajopt.errors import ArgumentError
+from trajopt.optimize.ipopt import numpy_on_symbols
 from trajopt.robots.asoc import (
     AsocGeometry,
     asoc_platform,
@@ -197,10 +198,10 @@ def test_printed_sliding_rows_lack_a_term(kind: WheelKind) -> None:
 
 
 def test_same_rows_on_symbols() -> None:
-    ca.GlobalOptions.setNumpyMode(1)
     platform = asoc_platform(AsocGeometry(2))
     angles = ca.MX.sym("beta", 4)
-    matrix = ca.vertcat(*[ca.horzcat(*row) for row in pfaffian_rows(platform, [angles[i] for i in range(4)])])
+    with numpy_on_symbols(True):
+        matrix = ca.vertcat(*[ca.horzcat(*row) for row in pfaffian_rows(platform, [angles[i] for i in range(4)])])
     numbers = np.array([0.3, 0.3, -0.8, -0.8])
     symbolic = np.array(ca.Function("a", [angles], [matrix])(numbers))
     np.testing.assert_allclose(symbolic, pfaffian(platform, numbers), atol=1e-14)

@@ -8,7 +8,8 @@ result exact where the objective has residuals. The only module that imports cas
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
@@ -163,16 +164,29 @@ class _Program:
 
 
 def _in_symbols(objective: SymbolicObjective, z: Any, p: Any) -> SymbolicProblem:
-    import casadi as ca
-
-    before = ca.GlobalOptions.getNumpyMode()
-    ca.GlobalOptions.setNumpyMode(1)  # NumPy functions run on symbols; only here, since the switch is global
     try:
-        return objective.symbolic(z, p)
+        with numpy_on_symbols(True):
+            return objective.symbolic(z, p)
     except Exception as error:  # whatever a user's function raises on symbols
         raise ArgumentError("objective", f"{type(error).__name__}: {error}", "a function written with NumPy "
                             "functions and arithmetic on its components, so that it runs on CasADi symbols; "
                             "take slsqp or pso otherwise") from error
+
+
+@contextmanager
+def numpy_on_symbols(on: bool) -> Iterator[None]:
+    """Whether NumPy's functions and shapes hold for symbols inside the block (or the function, as a decorator).
+
+    On: ``np.sin(x)`` runs on symbols, and vectors have NumPy's one dimension. Off: vectors are columns, and a
+    NumPy vector times a column of symbols goes element by element, as the programs of this package are written.
+    CasADi's switch is global, so each block sets what it needs and gives back what it found.
+    """
+    import casadi as ca
+
+    before = ca.GlobalOptions.getNumpyMode()
+    ca.GlobalOptions.setNumpyMode(1 if on else 0)
+    try:
+        yield
     finally:
         ca.GlobalOptions.setNumpyMode(before)
 
