@@ -100,9 +100,6 @@ class ManeuverProblem(Section):
                                                                    f"here {complaint}")
         if not self.limits.as_limits():
             raise broken_rule("limits", {}, "at least one limit")
-        if (self.limits.acceleration is None) != (self.limits.deceleration is None):
-            raise broken_rule("limits.deceleration", self.limits.deceleration,
-                              "acceleration and deceleration both given or both left out")
         return self
 
     @property

@@ -159,6 +159,13 @@ class Limits(Section):
     friction: Positive | None = Field(None, description="friction coefficient for the slip limit")
     tip: bool = Field(False, description="keep every wheel on the ground")
 
+    @model_validator(mode="after")
+    def _both_or_none(self) -> Self:
+        if (self.acceleration is None) != (self.deceleration is None):
+            raise broken_rule("deceleration", self.deceleration,
+                              "acceleration and deceleration both given or both left out")
+        return self
+
     def as_limits(self) -> tuple[Limit, ...]:
         """The limits that are given, as time scaling takes them."""
         found: list[Limit] = []
@@ -205,9 +212,6 @@ class Problem(Section):
                                                         f"y {list(self.space.y)}")
         if math.dist(self.start.pose[:2], self.goal.pose[:2]) < 1e-6:
             raise broken_rule("goal.pose", list(self.goal.pose), "a position different from start.pose")
-        if (self.limits.acceleration is None) != (self.limits.deceleration is None):
-            raise broken_rule("limits.deceleration", self.limits.deceleration,
-                        "acceleration and deceleration both given or both left out")
         if self.objective.kind == "duration" and self.actuator.enabled:
             raise broken_rule("actuator.enabled", True, "false with objective.kind = \"duration\": a time-scaled "
                         "motion keeps wheel speeds within limits, so no actuator saturates")
