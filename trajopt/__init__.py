@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from trajopt.limits.wheel_acceleration import WheelAcceleration
     from trajopt.limits.wheel_speed import WheelSpeed
     from trajopt.limits.yaw_rate import YawRate
+    from trajopt.maneuver import plan_climb
     from trajopt.maneuver_problem import load_maneuver
     from trajopt.optimize.base import Budget, OptimizeResult, Status
     from trajopt.optimize.search import minimize
@@ -32,9 +33,13 @@ if TYPE_CHECKING:
     from trajopt.paths.path import Path
     from trajopt.pipeline import Solution, solve, time_path, validate
     from trajopt.problem import Problem, load_problem
+    from trajopt.refine import limit_jerk
+    from trajopt.refine_path import optimize_path
+    from trajopt.refine_profile import follow
     from trajopt.robots.loc8 import loc8
     from trajopt.robots.powerbot import powerbot
     from trajopt.simulate.check import ValidationReport
+    from trajopt.study.sweeps import sweep
     from trajopt.timing.scaling import time_scale
     from trajopt.timing.trajectory import State, Trajectory
     from trajopt.world.terrain import Flat, Step
@@ -44,15 +49,6 @@ __version__ = "0.1.0"
 # public name -> the module it lives in
 _HOME = {
     "Acceleration": "trajopt.limits.acceleration",
-    "Slip": "trajopt.limits.slip",
-    "Speed": "trajopt.limits.speed",
-    "SpeedZones": "trajopt.limits.speed_bound",
-    "Tip": "trajopt.limits.tip",
-    "WheelAcceleration": "trajopt.limits.wheel_acceleration",
-    "WheelSpeed": "trajopt.limits.wheel_speed",
-    "YawRate": "trajopt.limits.yaw_rate",
-    "loc8": "trajopt.robots.loc8",
-    "powerbot": "trajopt.robots.powerbot",
     "ArgumentError": "trajopt.errors",
     "Budget": "trajopt.optimize.base",
     "Flat": "trajopt.world.terrain",
@@ -63,18 +59,32 @@ _HOME = {
     "Problem": "trajopt.problem",
     "ProblemError": "trajopt.errors",
     "SimulationError": "trajopt.errors",
+    "Slip": "trajopt.limits.slip",
     "Solution": "trajopt.pipeline",
+    "Speed": "trajopt.limits.speed",
+    "SpeedZones": "trajopt.limits.speed_bound",
     "State": "trajopt.timing.trajectory",
     "Status": "trajopt.optimize.base",
     "Step": "trajopt.world.terrain",
+    "Tip": "trajopt.limits.tip",
     "Trajectory": "trajopt.timing.trajectory",
     "TrajoptError": "trajopt.errors",
     "ValidationReport": "trajopt.simulate.check",
+    "WheelAcceleration": "trajopt.limits.wheel_acceleration",
+    "WheelSpeed": "trajopt.limits.wheel_speed",
+    "YawRate": "trajopt.limits.yaw_rate",
+    "follow": "trajopt.refine_profile",
+    "limit_jerk": "trajopt.refine",
     "load_maneuver": "trajopt.maneuver_problem",
     "load_path_problem": "trajopt.path_problem",
     "load_problem": "trajopt.problem",
+    "loc8": "trajopt.robots.loc8",
     "minimize": "trajopt.optimize.search",
+    "optimize_path": "trajopt.refine_path",
+    "plan_climb": "trajopt.maneuver",
+    "powerbot": "trajopt.robots.powerbot",
     "solve": "trajopt.pipeline",
+    "sweep": "trajopt.study.sweeps",
     "time_path": "trajopt.pipeline",
     "time_scale": "trajopt.timing.scaling",
     "validate": "trajopt.pipeline",
@@ -106,13 +116,18 @@ __all__ = [
     "WheelAcceleration",
     "WheelSpeed",
     "YawRate",
+    "follow",
+    "limit_jerk",
     "load_maneuver",
     "load_path_problem",
     "load_problem",
     "loc8",
     "minimize",
+    "optimize_path",
+    "plan_climb",
     "powerbot",
     "solve",
+    "sweep",
     "time_path",
     "time_scale",
     "validate",
