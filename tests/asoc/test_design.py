@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,15 +27,19 @@ from trajopt.objectives.isotropy_curve import isotropy_curve
 from trajopt.optimize.base import Budget
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.pareto import nondominated, pareto_front
+from trajopt.optimize.pso import thesis_enhanced, thesis_first
 from trajopt.optimize.search import OPTIMIZERS, minimize
 from trajopt.robots.isotropy import mean_isotropy, spread_modules
 from trajopt.robots.soil import SOILS, soil_named
 
 DATA = Path(__file__).parent.parent / "data" / "asoc"
 # These handle constraints, so they must not refuse this problem.
-CONSTRAINED = {"pso", "ipopt", "slsqp", "trust-constr", "differential-evolution"}
-# Swarms without damping (thesis 000): they may stop further away.
-UNDAMPED = {"pso-thesis-first", "pso-thesis-enhanced"}
+CONSTRAINED = {"pso", "pso-ring", "pso-inertia", "pso-thesis-first", "pso-thesis-enhanced", "ipopt", "slsqp",
+               "trust-constr", "differential-evolution", "cma-es", "hybrid"}
+# Swarms without damping (thesis 000) end 1-3 % short whatever one swarm may use: they get more, in restarts.
+UNDAMPED = {"pso-thesis-first": thesis_first(), "pso-thesis-enhanced": thesis_enhanced()}
+EVALUATIONS = 6_000
+RESTARTED_EVALUATIONS = 200_000  # ten seeds end at most 0.44 % short with them
 
 
 def table(name: str) -> list[dict[str, str]]:
@@ -152,16 +157,37 @@ def test_ipopt_takes_less_than_a_tenth_of_a_second(design) -> None:
 
 
 @pytest.mark.parametrize("name", list(OPTIMIZERS))
-def test_every_optimizer_ends_at_the_same_design_quality(name: str, design) -> None:
+def test_every_optimizer_ends_within_a_percent_of_the_factorial(name: str, design) -> None:
+    method, evaluations = name, EVALUATIONS
+    if name in UNDAMPED:
+        method, evaluations = replace(UNDAMPED[name], stagnation=20, restart=True), RESTARTED_EVALUATIONS
     try:
-        found = minimize(design, design.bounds, optimizer=name, seed=1, budget=Budget(evaluations=6000))
+        found = minimize(design, design.bounds, optimizer=method, seed=1, budget=Budget(evaluations=evaluations))
     except ArgumentError as refusal:
         if refusal.argument != "optimizer" or name in CONSTRAINED:
             raise
         return
+    assert name in CONSTRAINED
     assert found.violation <= 1e-9
-    share = 0.04 if name in UNDAMPED else 0.01
-    assert -found.fun == pytest.approx(full_factorial(design)[1], rel=share)
+    assert -found.fun == pytest.approx(full_factorial(design)[1], rel=0.01)
+
+
+def test_why_the_undamped_swarms_need_restarts(design) -> None:
+    """The first flies off for good, so that a larger budget changes nothing; the second never comes to rest."""
+    first, more = (minimize(design, design.bounds, optimizer=thesis_first(), seed=1,
+                            budget=Budget(evaluations=n)) for n in (25_000, 100_000))
+    assert first.fun == more.fun
+    swarm = thesis_first().swarm(design.bounds, np.random.default_rng(1))
+    still = thesis_enhanced().swarm(design.bounds, np.random.default_rng(1))
+    low, high = design.bounds.T
+    for each in (swarm, still):
+        for _ in range(300):
+            x = each.ask()
+            found = design.evaluate(x)
+            each.tell(found.cost, found.violation + np.maximum(np.maximum(low - x, x - high), 0.0).sum(axis=1))
+    inside = np.all((swarm.ask() >= low) & (swarm.ask() <= high), axis=1)
+    assert not inside.any()
+    assert np.median(np.abs(still.v) / (high - low)) > 0.01
 
 
 def test_pareto_front_holds_the_factorials_best_terms(design) -> None:

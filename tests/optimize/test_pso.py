@@ -147,3 +147,16 @@ def test_bad_input_is_named(tmp_path: Path) -> None:
 
 def test_numba_is_not_loaded_for_the_swarm_alone() -> None:
     assert "numba" in sys.modules or swarm_module._kernel() is None
+
+
+@pytest.mark.parametrize("option", range(len(OPTIONS)))
+def test_restarts_use_the_whole_budget_and_lose_nothing(option: int) -> None:
+    once = replace(OPTIONS[option], particles=10, stagnation=5)
+    bounds, budget = BOX, Budget(evaluations=3_000)
+    plain = minimize(rastrigin, bounds, optimizer=once, seed=4, budget=budget)
+    again = minimize(rastrigin, bounds, optimizer=replace(once, restart=True), seed=4, budget=budget)
+    assert plain.nfev < again.nfev == 3_000
+    assert again.status is Status.EVALUATIONS
+    assert again.fun <= plain.fun
+    same = minimize(rastrigin, bounds, optimizer=replace(once, restart=True), seed=4, budget=budget)
+    assert same.x.tobytes() == again.x.tobytes()

@@ -48,6 +48,8 @@ class ParticleSwarm:
     "sobol" takes a Sobol sequence with a random shift.
     ``velocity_limit``: largest velocity as a share of the width of the bounds; None: unlimited.
     ``stagnation``: iterations without improvement after which the search ends; None: never.
+    ``restart``: where the search would end by itself (stagnation, collapse, all particles lost), a new swarm
+    starts instead, its first particle on the best candidate so far; then only the budget ends the search.
     """
 
     name: ClassVar[str] = "pso"
@@ -66,6 +68,7 @@ class ParticleSwarm:
     final_inertia: float | None = None
     horizon: int = 500  # iterations, thesis 000 Table 5.8
     stagnation: int | None = None
+    restart: bool = False
 
     def __post_init__(self) -> None:
         if self.particles < 2:
@@ -84,13 +87,21 @@ class ParticleSwarm:
 
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
                  rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Search until the budget ends, the swarm stagnates, or it has collapsed to one point.
+        """Search until the budget ends or, without ``restart``, the swarm stagnates or collapses to one point.
 
         ``x0`` (d,) becomes the first particle's position.
         """
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self._search(run, self.swarm(box, rng, x0=x0)))
+
+        def search() -> tuple[Status, str]:
+            ended = self._search(run, self.swarm(box, rng, x0=x0))
+            while self.restart:
+                best = None if run.best_x is None else np.clip(run.best_x, box[:, 0], box[:, 1])
+                self._search(run, self.swarm(box, rng, x0=best))
+            return ended
+
+        return run.finish(self.name, search)
 
     def swarm(self, bounds: ArrayLike, rng: Generator, *, x0: ArrayLike | None = None) -> Swarm:
         """A swarm of one's own to drive: ``x = swarm.ask()``, evaluate, ``swarm.tell(cost, violation)``."""
@@ -101,10 +112,11 @@ class ParticleSwarm:
 
     def _search(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
         unseen = 0  # iterations in a row without a particle inside
+        inside = self.boundary != "none"
         while True:
             asked = swarm.ask()
             if self.boundary != "invisible":
-                result = run.evaluate(asked)
+                result = run.evaluate(asked, inside=inside)
                 swarm.learn(result.cost, result.violation)
             elif len(asked):
                 result, unseen = run.evaluate(asked), 0
@@ -137,10 +149,18 @@ def falling_inertia() -> ParticleSwarm:
 
 
 def thesis_first() -> ParticleSwarm:
-    """Thesis 000, Table 5.2: c1 = c2 = 0.45, no inertia weight, particles may leave the space."""
+    """Thesis 000, Table 5.2: c1 = c2 = 0.45, no inertia weight, particles may leave the space.
+
+    Nothing damps this swarm (with w = 1 the variance of a particle's position grows without bound, whatever c1
+    and c2 are) and nothing brings it back: soon all particles are outside for good, and a larger budget
+    changes nothing. ``dataclasses.replace(thesis_first(), stagnation=20, restart=True)`` uses one.
+    """
     return ParticleSwarm(inertia=1.0, cognitive=0.45, social=0.45, boundary="none", start="grid")
 
 
 def thesis_enhanced() -> ParticleSwarm:
-    """Thesis 000, Table 5.8: c1 = c2 = 0.15, no inertia weight, particles that leave are reset."""
+    """Thesis 000, Table 5.8: c1 = c2 = 0.15, no inertia weight, particles that leave are reset.
+
+    As undamped as the first one; the resets keep it inside, where it samples rather than converges.
+    """
     return ParticleSwarm(inertia=1.0, cognitive=0.15, social=0.15, boundary="reset", start="grid")
