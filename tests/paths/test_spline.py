@@ -135,3 +135,9 @@ def test_a_heading_of_its_own_needs_level_ground():
     Path.through([[0, 0, 1], [1, 0, 1]], heading=[0, 1])
     with pytest.raises(ArgumentError, match="level ground"):
         Path.through([[0, 0, 0], [1, 0, 1]], heading=[0, 1])
+
+
+@pytest.mark.parametrize("far", [1e8, 1e300, np.inf, np.nan])
+def test_absurd_coordinates_are_named_not_computed_with(far: float) -> None:
+    with pytest.raises(ArgumentError, match="at most 1e\\+07|finite"):
+        Path.through([[0.0, 0.0], [far, 2.0], [4.0, 0.0]])

@@ -19,6 +19,7 @@ from trajopt.paths.spline import SplineBasis, chord_length_knots
 Array = NDArray[np.float64]
 
 _CELLS_PER_SEGMENT = 64  # quadrature cells a spline segment: length error below 1e-12 on smooth paths
+_LARGEST = 1e7  # m (and rad): farther than any robot drives; squares of it keep nine digits of a metre. Chosen
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
 
 
@@ -41,8 +42,8 @@ class Path:
         if len(shape) != 2 or shape[0] != self.basis.size or shape[1] not in (2, 3):
             raise ArgumentError("coordinates", shape, f"shape ({self.basis.size}, 2) or ({self.basis.size}, 3)")
         for name, values in (("coordinates", self.coordinates), ("heading", self.heading)):
-            if values is not None and not np.all(np.isfinite(values)):
-                raise ArgumentError(name, np.asarray(values).tolist(), "finite numbers")
+            if values is not None and not np.all(np.abs(values) <= _LARGEST):  # NaN is refused too
+                raise ArgumentError(name, np.asarray(values).tolist(), f"finite numbers, at most {_LARGEST:g} in size")
         if self.heading is not None and np.shape(self.heading) != (self.basis.size,):
             raise ArgumentError("heading", np.shape(self.heading), f"shape ({self.basis.size},)")
         if not 0 < self.turning_length < np.inf:
