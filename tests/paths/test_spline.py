@@ -139,5 +139,5 @@ def test_a_heading_of_its_own_needs_level_ground():
 
 @pytest.mark.parametrize("far", [1e8, 1e300, np.inf, np.nan])
 def test_absurd_coordinates_are_named_not_computed_with(far: float) -> None:
-    with pytest.raises(ArgumentError, match="at most 1e\\+07|finite"):
+    with pytest.raises(ArgumentError, match=r"at most 1e\+07|finite"):
         Path.through([[0.0, 0.0], [far, 2.0], [4.0, 0.0]])
