@@ -42,8 +42,8 @@ class Path:
         if len(shape) != 2 or shape[0] != self.basis.size or shape[1] not in (2, 3):
             raise ArgumentError("coordinates", shape, f"shape ({self.basis.size}, 2) or ({self.basis.size}, 3)")
         for name, values in (("coordinates", self.coordinates), ("heading", self.heading)):
-            if values is not None and not np.all(np.abs(values) <= _LARGEST):  # NaN is refused too
-                raise ArgumentError(name, np.asarray(values).tolist(), f"finite numbers, at most {_LARGEST:g} in size")
+            if values is not None:
+                _check_size(name, values)
         if self.heading is not None and np.shape(self.heading) != (self.basis.size,):
             raise ArgumentError("heading", np.shape(self.heading), f"shape ({self.basis.size},)")
         if not 0 < self.turning_length < np.inf:
@@ -65,8 +65,7 @@ class Path:
         array = np.asarray(points, dtype=np.float64)
         if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] not in (2, 3):
             raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
-        if not np.all(np.isfinite(array)):
-            raise ArgumentError("points", array.tolist(), "finite numbers")
+        _check_size("points", array)
         given = chord_length_knots(array) if knots is None else tuple(np.asarray(knots, dtype=float).tolist())
         if len(given) != len(array):
             raise ArgumentError("knots", len(given), f"one knot a point ({len(array)})")
@@ -200,3 +199,8 @@ class Path:
             rate = self.rate(u)
             u = np.clip(u - residual / np.where(rate > 0, rate, np.inf), grid[i], grid[i + 1])
         return np.asarray(u)
+
+
+def _check_size(name: str, values: Array) -> None:
+    if not np.all(np.abs(values) <= _LARGEST):  # NaN is refused too
+        raise ArgumentError(name, np.asarray(values).tolist(), f"finite numbers, at most {_LARGEST:g} in size")
