@@ -27,6 +27,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pandas as pd
+
 from tests.study.run_functions import paced
 from trajopt.study.engines import Engine, dask_local, processes
 from trajopt.study.host import CaseLimits
@@ -53,9 +55,13 @@ def cases(count: int) -> list[dict[str, int]]:
 
 
 def digest(store: Store) -> str:
-    """Hash of the sorted table without its columns of time, host and path, as CSV bytes."""
+    """Hash of the sorted table without its columns of time, host and path, as CSV bytes, and of the arrays."""
     text = io.StringIO()
     store.stable_table().to_pandas().to_csv(text, index=False)
+    arrays = [pd.read_parquet(p) for p in store.parts("arrays")]
+    if arrays:
+        beside = pd.concat(arrays).drop_duplicates(["case", "name"]).sort_values(["case", "name"])
+        beside.assign(**{c: beside[c].map(list) for c in ("shape", "values")}).to_csv(text, index=False)
     return hashlib.sha256(text.getvalue().encode()).hexdigest()
 
 
@@ -136,13 +142,20 @@ def _one_sweep(kills: int, engine: str, count: int, draw: random.Random, outcome
         if process.wait() == 0:
             return
         if process.returncode != -signal.SIGKILL:
-            outcome.faults.append(f"{place}: the sweep ended with {process.returncode}")
+            told = _said(place).read_text(errors="replace")[-6000:]
+            outcome.faults.append(f"{place}: the sweep ended with {process.returncode}\n{told}")
             return
 
 
 def _start(engine: str, count: int, place: Path) -> subprocess.Popen[bytes]:
-    return subprocess.Popen([sys.executable, "-m", "tests.study.crashes", "--work", str(place), "--engine", engine,
-                             "--cases", str(count)], cwd=ROOT, stdin=subprocess.DEVNULL)
+    with _said(place).open("wb") as said:
+        return subprocess.Popen([sys.executable, "-m", "tests.study.crashes", "--work", str(place), "--engine", engine,
+                                 "--cases", str(count)], cwd=ROOT, stdin=subprocess.DEVNULL, stderr=said)
+
+
+def _said(place: Path) -> Path:
+    """What the last sweep in ``place`` wrote to standard error."""
+    return place.with_suffix(".stderr")
 
 
 def _read_on(place: Path, count: int, stop: threading.Event, outcome: Outcome) -> None:

@@ -38,6 +38,12 @@ def mixed(case: Case) -> dict[str, Any]:
             "track": np.arange(6.0).reshape(3, 2) * case["x"]}
 
 
+def paced_mixed(case: Case) -> dict[str, Any]:
+    """``mixed``, 3 ms long: enough for many chunks."""
+    time.sleep(0.003)
+    return mixed(case)
+
+
 def poisoned(case: Case) -> Any:
     """A different disaster by ``kind`` for one case; all others are ``cheap``."""
     match case["kind"]:
