@@ -67,6 +67,8 @@ class Swarm:
         self._limit = width * (np.inf if self.rules.velocity_limit is None else self.rules.velocity_limit)
         self._kernel = _kernel()
         self._pulls = np.empty((2, *self.x.shape))
+        self._drawn = np.empty((2, *self.x.shape))
+        self._leaders = np.zeros(len(self.x), dtype=np.intp)
 
     @classmethod
     def begin(cls, rules: SwarmRules, bounds: Array, rng: Generator, x0: Array | None = None) -> Swarm:
@@ -98,7 +100,13 @@ class Swarm:
         reached = self.own_cost[leader], self.own_violation[leader]
         self.idle = 0 if better(*reached, *self._reached) else self.idle + 1
         self._reached = float(reached[0]), float(reached[1])
-        self._move(self.own[leader] if self.rules.topology == "gbest" else self.own[self._ring_leaders()])
+        if self.rules.topology == "gbest":
+            self._leaders.fill(leader)
+        elif self._kernel is None:
+            self._leaders[:] = self._ring_leaders()
+        else:
+            self._kernel.ring_leaders(self.own_cost, self.own_violation, self.rules.neighbours, self._leaders)
+        self._move()
         self.iteration += 1
 
     @property
@@ -190,23 +198,25 @@ class Swarm:
         best = np.min([np.roll(rank, k) for k in range(-reach, reach + 1)], axis=0)
         return np.asarray(order[best])
 
-    def _move(self, leader: Array) -> None:
+    def _move(self) -> None:
         rules, x, v = self.rules, self.x, self.v
-        r = np.asarray(self.rng.random(self._pulls.shape))
+        r = self.rng.random(out=self._drawn)
         low, high = self._low, self._high
-        if self._kernel is not None and leader.ndim == 1:
-            if not self._kernel.move(x, v, self.own, leader, r, self._inertia(), rules.cognitive, rules.social,
+        if self._kernel is not None:
+            if not self._kernel.move(x, v, self.own, self._leaders, r, self._inertia(), rules.cognitive, rules.social,
                                      low, high, self._limit):
                 return  # no coordinate lies outside
         else:
-            self._move_readably(leader, r)
+            self._move_readably(r)
         if rules.boundary in ("reset", "reflect", "absorb"):
-            below, above = x < low, x > high
-            if np.count_nonzero(below) or np.count_nonzero(above):
-                _bring_back(rules.boundary, x, v, low, high, below | above, self.rng)
+            rows, columns = ((x < low) | (x > high)).nonzero()
+            if len(rows):
+                _bring_back(rules.boundary, x, v, low, high, rows, columns, self.rng)
 
-    def _move_readably(self, leader: Array, r: Array) -> None:
+    def _move_readably(self, r: Array) -> None:
         x, v, pulls = self.x, self.v, self._pulls
+        gbest = self.rules.topology == "gbest"
+        leader = self.own[self._leaders[0]] if gbest else self.own[self._leaders]
         np.subtract(self.own, x, out=pulls[0])
         np.subtract(leader, x, out=pulls[1])
         pulls *= self._gains
@@ -226,22 +236,22 @@ class Swarm:
         return rules.inertia + (rules.final_inertia - rules.inertia) * done
 
 
-def _bring_back(boundary: str, x: Array, v: Array, low: Array, high: Array, outside: NDArray[np.bool_],
-                rng: Generator) -> None:
-    """Apply a boundary rule to the particles outside, in place."""
-    width = high - low
+def _bring_back(boundary: str, x: Array, v: Array, low: Array, high: Array, rows: NDArray[np.intp],
+                columns: NDArray[np.intp], rng: Generator) -> None:
+    """Apply a boundary rule to the coordinates outside, x[rows, columns], in place."""
+    if boundary == "reset":  # thesis 000, Table 5.4: anew, inside 0.9 of the space
+        lost, width = np.unique(rows), high - low
+        x[lost] = low + width / 2 + 0.9 * (rng.random((len(lost), x.shape[1])) - 0.5) * width
+        v[lost] = 0.0
+        return
+    at, least, most = x[rows, columns], low[columns], high[columns]
     if boundary == "absorb":
-        np.clip(x, low, high, out=x)
-        v[outside] = 0.0
-    elif boundary == "reflect":
-        t = np.mod((x - low) / width, 2.0)
-        x[outside] = np.clip(low + width * np.where(t > 1.0, 2.0 - t, t), low, high)[outside]
-        v[outside] *= -1.0
+        v[rows, columns] = 0.0
     else:
-        rows = outside.any(axis=1)
-        # Thesis 000, Table 5.4: anew, inside 0.9 of the space.
-        x[rows] = low + width / 2 + 0.9 * (rng.random((int(rows.sum()), x.shape[1])) - 0.5) * width
-        v[rows] = 0.0
+        t = np.mod((at - least) / (most - least), 2.0)
+        at = least + (most - least) * np.where(t > 1.0, 2.0 - t, t)
+        v[rows, columns] *= -1.0
+    x[rows, columns] = np.minimum(np.maximum(at, least), most)
 
 
 def _kernel() -> Any:

@@ -1,4 +1,4 @@
-"""One iteration of a global-best swarm as a numba kernel: the same bits as the NumPy form of ``swarm``.
+"""One iteration of a swarm as a numba kernel: the same bits as the NumPy form of ``swarm``.
 
 No fast-math, so that every operation is rounded as NumPy rounds it; a test holds the two together exactly.
 """
@@ -37,11 +37,31 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
 
 
 @numba.njit(cache=True, error_model="numpy")
-def move(x, v, own, leader, r, inertia, cognitive, social, low, high, limit):  # type: ignore[no-untyped-def]
-    """Velocities and positions after one iteration, in place; how many coordinates lie outside."""
+def ring_leaders(own_cost, own_violation, reach, leaders):  # type: ignore[no-untyped-def]
+    """Fill ``leaders`` (n,): the index of the best own position within ``reach`` places on the ring."""
+    n = len(own_cost)
+    for i in range(n):
+        best = i
+        for k in range(-reach, reach + 1):
+            j = (i + k) % n
+            new = 0.0 if own_violation[j] <= FEASIBLE else own_violation[j]
+            old = 0.0 if own_violation[best] <= FEASIBLE else own_violation[best]
+            if new < old or (new == old and (own_cost[j] < own_cost[best]
+                                             or (own_cost[j] == own_cost[best] and j < best))):
+                best = j
+        leaders[i] = best
+
+
+@numba.njit(cache=True, error_model="numpy")
+def move(x, v, own, leaders, r, inertia, cognitive, social, low, high, limit):  # type: ignore[no-untyped-def]
+    """Velocities and positions after one iteration, in place; how many coordinates lie outside.
+
+    ``leaders`` (n,): whose own best position each particle follows.
+    """
     n, d = x.shape
     outside = 0
     for i in range(n):
+        leader = own[leaders[i]]
         for j in range(d):
             p = (own[i, j] - x[i, j]) * cognitive * r[0, i, j]
             q = (leader[j] - x[i, j]) * social * r[1, i, j]
@@ -54,8 +74,9 @@ def move(x, v, own, leader, r, inertia, cognitive, social, low, high, limit):  #
 
 
 def warm() -> None:
-    """Load both kernels from the cache, or compile them."""
+    """Load the kernels from the cache, or compile them."""
     x, one = np.zeros((2, 1)), np.ones(1)
-    cost = np.zeros(2)
+    cost, leaders = np.zeros(2), np.zeros(2, dtype=np.intp)
     remember(x, x.copy(), cost.copy(), cost.copy(), cost, cost)
-    move(x, x.copy(), x.copy(), one, np.zeros((2, 2, 1)), 0.5, 0.5, 0.5, -one, one, one)
+    ring_leaders(cost, cost, 1, leaders)
+    move(x, x.copy(), x.copy(), leaders, np.zeros((2, 2, 1)), 0.5, 0.5, 0.5, -one, one, one)

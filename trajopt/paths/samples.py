@@ -55,7 +55,7 @@ def sample_at(path: Path, s: Array, u: Array) -> PathSamples:
     """
     p = [path.position(u, k) for k in range(4)]
     if path.heading is None:
-        return _along_tangent(s, u, p)
+        return along_tangent(s, u, p)
     yaw = [path.yaw(u, k) for k in range(4)]
     return _free_heading(s, u, p, yaw, path.turning_length)
 
@@ -77,7 +77,7 @@ def _by_path_parameter(s: Array, c1: Array, c2: Array, c3: Array) -> tuple[Array
     return first, second, third
 
 
-def _along_tangent(s: Array, u: Array, p: list[Array]) -> PathSamples:
+def along_tangent(s: Array, u: Array, p: list[Array]) -> PathSamples:
     """Heading along the path: twist (1, 0, geodesic curvature). The lateral axis stays level."""
     t, t1, t2 = _by_path_parameter(s, p[1], p[2], p[3])
     level = np.hypot(t[:, 0], t[:, 1])

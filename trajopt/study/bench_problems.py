@@ -1,8 +1,9 @@
 """The problems of the optimizer benchmark, by name, each with its best known value.
 
 Names: ``smdw/<file>/<free>`` and ``smdw/<file>/<free>/limits`` (a problem file in a decision space, without and
-with actuator limits); ``random-smdw/<seed>/<free>[/limits]``; ``asoc/<soil>``; ``classical/<function>-<d>``;
-``more-wild/<name>``; whatever a plugin file's ``PROBLEMS`` offers. ``<free>`` joins names with "+".
+with actuator limits); ``random-smdw/<seed>/<free>[/limits]``; ``corridor/<seed>/length`` or ``/duration`` (see
+``route_problems``); ``powerbot/<file>``; ``asoc/<soil>``; ``classical/<function>-<d>``; ``more-wild/<name>``;
+whatever a plugin file's ``PROBLEMS`` offers. ``<free>`` joins names with "+".
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def objective_named(name: str, plugins: tuple[str, ...] = (), root: str = "probl
     family, _, rest = name.partition("/")
     makers: dict[str, Callable[[str], tuple[Objective, Array]]] = {
         "smdw": lambda text: _smdw(text, root), "random-smdw": lambda text: _random_smdw(text, root),
-        "asoc": _asoc, "classical": _classical, "more-wild": _more_wild}
+        "corridor": _corridor, "powerbot": lambda text: _powerbot(text, root), "asoc": _asoc, "classical": _classical, "more-wild": _more_wild}
     for file in plugins:
         offered = mapping_of_file(file, "PROBLEMS")
         if name in offered:
@@ -134,6 +135,23 @@ def _random_smdw(text: str, root: str) -> tuple[Objective, Array]:
     goal = {"pose": pose.tolist(), "wheels": rng.uniform(-np.pi, np.pi, 4).tolist(),
             "critical": pairs[int(rng.integers(len(pairs)))]}
     return _terminal(problem.replace(goal=goal), free, limited)
+
+
+def _corridor(text: str) -> tuple[Objective, Array]:
+    from trajopt.study.route_problems import random_corridor
+
+    seed, _, kind = text.partition("/")
+    if not seed.isdigit() or kind not in ("length", "duration"):
+        raise ArgumentError("problem", f"corridor/{text}", "corridor/<seed>/length or corridor/<seed>/duration")
+    objective = random_corridor(int(seed), kind)  # type: ignore[arg-type]
+    return objective, objective.bounds
+
+
+def _powerbot(text: str, root: str) -> tuple[Objective, Array]:
+    from trajopt.study.route_problems import moved_knots
+
+    objective = moved_knots(Path(root) / "powerbot" / f"{text}.toml")
+    return objective, objective.bounds
 
 
 def _asoc(text: str) -> tuple[Objective, Array]:
