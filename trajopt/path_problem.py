@@ -27,7 +27,7 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
-from trajopt.problem import NonNegative, Positive, Section, broken_rule, read_tables, validated
+from trajopt.problem import NonNegative, Positive, Section, broken_rule, read_tables, set_key, validated
 from trajopt.robots.platform import Platform
 from trajopt.robots.powerbot import LARGEST_GRADE, powerbot
 from trajopt.world.ramp import Ramp, Ramps, lay_over
@@ -217,13 +217,19 @@ class PathProblem(Section):
         """The speed to follow, as a bound along the path."""
         return None if self.profile is None else SpeedProfile(self.profile.places, self.profile.speeds)
 
-    def replace(self, **sections: Any) -> PathProblem:
-        """Copy with changed sections or parts of them (limits={"friction": 0.5}), checked like a file."""
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **sections: Any) -> PathProblem:
+        """Copy with changes, checked like a file.
+
+        ``changes`` maps dotted keys to values ({"limits.friction": 0.5}); keyword arguments name whole sections or
+        parts of them (limits={"friction": 0.5}). None takes a key out. Raises ProblemError.
+        """
         data = self.model_dump(mode="json", exclude_none=True)
+        for key, value in {**(changes or {}), **{k: v for k, v in sections.items() if "." in k}}.items():
+            set_key(data, key.split("."), value, self.source)
         for name, value in sections.items():
             if isinstance(value, Mapping) and isinstance(data.get(name), dict):
                 data[name].update(value)
-            else:
+            elif "." not in name:
                 data[name] = value
         return validated(PathProblem, data, self.source)
 

@@ -135,6 +135,21 @@ def test_wrong_files_are_refused_in_one_line(change: dict[str, object], key: str
     assert "\n" not in str(caught.value)
 
 
+def test_dotted_keys_replace_and_override_as_in_other_problem_files() -> None:
+    task = problem(4)
+    assert task.replace({"limits.friction": 0.5, "path.start_rate": np.float64(0.4)}).limits.friction == 0.5
+    assert task.replace(**{"limits.safety_speed": 0.4}).limits.safety_speed == 0.4
+    assert task.replace({"limits.friction": None}).limits.friction is None
+    assert task.replace(limits={"friction": 0.4}).limits.speed == task.limits.speed
+    file = ROOT / "problems" / "powerbot" / "experiment_4.toml"
+    assert load_path_problem(file, {"limits.friction": 0.5}) == task.replace({"limits.friction": 0.5})
+    for wrong in ("limits.frction", "limits.friction.deep"):
+        with pytest.raises(ProblemError, match=wrong):
+            task.replace({wrong: 1.0})
+        with pytest.raises(ProblemError, match=wrong):
+            load_path_problem(file, {wrong: 1.0})
+
+
 def test_friction_of_appendix_2() -> None:
     pulls = [pounds * NEWTON_PER_POUND for pounds in (62, 58, 60)]
     found = friction_from_pulls(pulls, mass=148.0, cog_to_drive=0.132, cog_to_caster=0.218, pull_height=0.129)
