@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ from trajopt.timing.engines import ENGINES, pick_engine, require_engine
 from trajopt.timing.feasibility import allowed_end, require_motion
 from trajopt.timing.grid import initial_grid, insert, split
 from trajopt.timing.linear import linear_profile
+from trajopt.timing.overspeed import yielding
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
 from trajopt.timing.trajectory import Trajectory
@@ -51,7 +53,7 @@ class _Job:
 def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
                terrain: Terrain | None = None, start_speed: float = 0.0, end_speed: float = 0.0,
                gridpoints: int | ArrayLike | None = None, engine: str = "auto",
-               stops: ArrayLike = ()) -> Trajectory:
+               stops: ArrayLike = (), too_fast: Literal["refuse", "brake"] = "refuse") -> Trajectory:
     """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s', m/s).
 
     ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast pass, where only
@@ -59,7 +61,11 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
     (thesis 004: one factor for the whole motion, uniform in the spline parameter, with the end speeds that
     the path gives it, so start and end speed must stay 0) and "segments" (below the speed of a factor for
     each spline segment). ``gridpoints``: how many, or path parameters (m); more are added where limits are
-    broken between them. ``stops``: path parameters (m) where the robot comes to rest on the way.
+    broken between them. ``stops``: path parameters (m) where the robot comes to rest on the way. ``too_fast``:
+    what to do where a bound on the speed alone (speed, zone, profile, wheel speed, yaw rate) lies below what
+    braking from ``start_speed`` can reach, as when a zone appears in front of a moving robot: "refuse" raises
+    InfeasibleError, "brake" brakes into it as fast as the other limits allow (with 99.9 % of it); the
+    trajectory's limits, and so its margins, then hold the bound that was raised to that braking.
 
     What is still broken between gridpoints is removed by slowing the whole motion, end speeds included, by
     at most 0.1 % (``Trajectory.slowdown``). Where standing still breaks a limit (momentum over a slope that
@@ -71,6 +77,10 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
     job = _job(path, limits, robot, terrain, (start_speed, end_speed), engine, stops)
     u = insert(path, initial_grid(path, gridpoints), job.stops)
     _require_drivable(job, u)
+    if too_fast == "brake" and start_speed > 0:
+        job = replace(job, limits=yielding(job.limits, fine_rows(path, u, job.limits, robot), job.start))
+    elif too_fast not in ("refuse", "brake"):
+        raise ArgumentError("too_fast", too_fast, "refuse or brake")
     if engine == "linear":
         return _linear(job, fine_rows(path, u, job.limits, robot))
     for tighter in _TIGHTER:
