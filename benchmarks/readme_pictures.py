@@ -1,25 +1,32 @@
-"""The pictures that README.md shows: `python -m benchmarks.readme_pictures` rewrites docs/pictures/."""
+"""The pictures that README.md shows.
+
+    python -m benchmarks.readme_pictures                                rewrites docs/pictures/ but for the sweep
+    python -m benchmarks.readme_pictures --climb out/sweeps/climb_rate  the two of the climb rate study, from its store
+"""
 
 from __future__ import annotations
 
+import argparse
 import shutil
 import tempfile
 from pathlib import Path
 
 from trajopt.pipeline import solve, validate
 from trajopt.problem import load_problem
+from trajopt.report.climb_rates import rate_lines, rate_maps
 from trajopt.report.pictures import save_physics_picture, save_pictures
+from trajopt.report.style import in_style, save_figure
+from trajopt.study.store import open_store
 
 FOLDER = Path("docs/pictures")
 PROBLEM = Path("problems/smdw/scenario_1_lateral.toml")
 
 
-def main() -> None:
+def approach() -> None:
     """Solve one scenario, check it in physics, and keep its pictures."""
     problem = load_problem(PROBLEM, {"spline.free": ["p1", "p2"]})
     solution = solve(problem)
     assert solution.trajectory is not None
-    FOLDER.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         save_pictures(solution, folder)
@@ -27,6 +34,29 @@ def main() -> None:
         for picture in ("path.png", "profile.png", "physics.png"):
             shutil.copy(folder / picture, FOLDER / picture)
             print(f"wrote {FOLDER / picture}")
+
+
+def climb_rates(store: Path) -> None:
+    """Draw the climb rate study from its store, and say its main numbers."""
+    frame = open_store(store, create=False).frame()
+    with in_style():
+        for name, figure in (("climb_rate_map.png", rate_maps(frame)), ("climb_rate_lines.png", rate_lines(frame))):
+            print(f"wrote {save_figure(figure, FOLDER / name)}")
+    sound = frame[frame["status"] == "done"].dropna(subset=["climbed"])
+    print(f"{len(frame)} rows, {len(sound)} trials count")
+    for column in ("obstacle.height", "friction", "heading_error", "torque"):
+        print(sound.pivot_table(index=column, columns="configuration", values="climbed").mul(100).round(1).to_string())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--climb", type=Path, help="store of problems/sweeps/climb_rate.toml")
+    options = parser.parse_args()
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    if options.climb is not None:
+        climb_rates(options.climb)
+    else:
+        approach()
 
 
 if __name__ == "__main__":

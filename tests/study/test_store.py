@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from trajopt.study.cases import CaseTable, case_table
+from tests.study.run_functions import noop
+from trajopt.study.cases import Case, CaseTable, case_table
 from trajopt.study.host import parameter_kinds
 from trajopt.study.rows import DONE, ERROR, Row, array_table, fitted, result_kinds, row_table
 from trajopt.study.store import Store, StoreError, open_store
+from trajopt.study.sweeps import sweep
 
 
 def write(store: Store, cases: CaseTable, rows: list[Row], name: str = "chunk") -> None:
@@ -129,6 +133,82 @@ def test_other_formats_are_refused(tmp_path: Path, content: str) -> None:
     (place / "store.json").write_text(content)
     with pytest.raises(StoreError, match=r"format|JSON"):
         open_store(place)
+
+
+OLD = Path(__file__).resolve().parents[1] / "data" / "sweep" / "format_1"
+
+
+def test_a_store_of_an_older_version_is_read_and_goes_on(tmp_path: Path) -> None:
+    """Written by the first version of this package that had sweeps (commit ff2b1b9), with x = 3 an error."""
+    place = shutil.copytree(OLD, tmp_path / "store", ignore=shutil.ignore_patterns("temporary", "jobs"))
+    store = open_store(place, create=False)
+    frame = store.frame()
+    assert store.counts() == {"done": 5, "error": 1}
+    assert sorted(frame["x"]) == list(range(6))
+    good = frame[frame["status"] == "done"]
+    assert (good["square"] == good["x"] ** 2.0).all()
+    row, arrays = store.case(good["case"].iloc[0])
+    np.testing.assert_array_equal(arrays["track"], np.arange(6.0).reshape(3, 2) * row["x"])
+    again = sweep([{"x": i, "friction": 0.1 * i, "kind": "ab"[i % 2], "place": [0.5, i]} for i in range(6)], noop,
+                  executor=1, store=place)
+    assert again.counts() == {"done": 11, "error": 1}  # another function: other cases, in one table with the old ones
+    again.compact()
+    assert len(again.frame()) == 12
+
+
+@pytest.mark.parametrize("version", [0, 2, "1"])
+def test_a_store_of_another_format_is_refused_and_left_alone(tmp_path: Path, version: object) -> None:
+    place = shutil.copytree(OLD, tmp_path / "store")
+    (place / "store.json").write_text(json.dumps({"format": version, "kind": "trajopt sweep"}))
+    before = {p: p.read_bytes() for p in place.rglob("*") if p.is_file()}
+    with pytest.raises(StoreError, match="but this version reads and writes format 1; use the trajopt version"):
+        sweep([{"x": 1}], noop, executor=1, store=place)
+    assert {p: p.read_bytes() for p in place.rglob("*") if p.is_file()} == before
+
+
+def late(case: Case) -> dict[str, Any]:
+    """A column that only some late cases have (none of the three sampled ones), and an error at the front."""
+    if case["x"] == 0:
+        raise ValueError("first")
+    row: dict[str, Any] = {"square": case["x"] ** 2.0}
+    return {**row, "late": case["x"] / 2} if 90 <= case["x"] < 99 else row
+
+
+@pytest.fixture(scope="module")
+def uneven(tmp_path_factory: pytest.TempPathFactory) -> Store:
+    """A finished sweep whose parts did not all know all columns when they were written."""
+    store = sweep([{"x": i} for i in range(100)], late, executor=1, store=tmp_path_factory.mktemp("uneven") / "store")
+    return sweep([{"x": i} for i in range(200, 203)], noop, executor=1, store=store)
+
+
+def test_pandas_reads_the_parts_as_they_are(uneven: Store) -> None:
+    assert len(uneven.parts()) > 1
+    frame = pd.read_parquet(uneven.path / "parts").sort_values("x")
+    assert frame["late"].dropna().tolist() == [x / 2 for x in range(90, 99)]
+
+
+def test_polars_reads_the_parts_as_they_are(uneven: Store) -> None:
+    polars = pytest.importorskip("polars", reason="polars is not installed")
+    frame = polars.read_parquet(uneven.path / "parts" / "*.parquet").sort("x")
+    assert frame["late"].drop_nulls().to_list() == [x / 2 for x in range(90, 99)]
+    assert frame["status"].to_list() == [ERROR] + [DONE] * 102
+
+
+def test_duckdb_reads_the_parts_as_they_are(uneven: Store) -> None:
+    duckdb = pytest.importorskip("duckdb", reason="duckdb is not installed")
+    found = duckdb.sql(f"select status, count(*), sum(late), sum(square) from '{uneven.path}/parts/*.parquet' "
+                       "group by status order by status").fetchall()
+    assert found == [(DONE, 102, sum(range(90, 99)) / 2, float(sum(x * x for x in range(100)))), (ERROR, 1, None, None)]
+
+
+def test_kinds_that_exclude_each_other_become_text(store: Store, cases: CaseTable) -> None:
+    write(store, cases, [Row(0, DONE, {"y": 0.5, "v": [1.0, 2.0]}, {})])
+    write(store, cases, [Row(1, DONE, {"y": "high", "v": True}, {})], "other")
+    assert sorted(store.frame()["y"]) == ["0.5", "high"]
+    before = store.table()
+    store.align()
+    assert store.table().equals(before)
+    assert sorted(pd.read_parquet(store.path / "parts")["v"]) == ["[1.0, 2.0]", "true"]
 
 
 def test_other_directories_are_refused(tmp_path: Path) -> None:

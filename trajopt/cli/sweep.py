@@ -132,6 +132,29 @@ def show(store: StorePath, case: Annotated[str, typer.Argument(help="first digit
         console.print(row["error_traceback"], markup=False, highlight=False)
 
 
+def report(source: Annotated[Path, typer.Argument(help="sweep file (*.toml), the store of a sweep, or a run folder")],
+           case: Annotated[str, typer.Argument(help="first digits of a case; none for a run folder")] = "",
+           out: Annotated[Path | None, typer.Option("--out", help="folder; default: out/report/<case>")] = None,
+           store: StoreOption = None) -> None:
+    """Draw the pictures of one case out of a sweep, or of a folder that solve wrote, again."""
+    from trajopt.study.store import open_store
+
+    if not case:
+        from trajopt.report.pictures import save_pictures
+        from trajopt.report.run_folder import read_solution
+
+        files = list(save_pictures(read_solution(source), out or source))
+    else:
+        from trajopt.report.sweep_case import report_case
+        from trajopt.study.sweepfile import load_sweep
+
+        plan = None if source.is_dir() else load_sweep(source)
+        place = source if plan is None else store or _default_store(source)
+        files = report_case(open_store(place, create=False), case, out or Path("out") / "report" / case, plan)
+    for file in files:
+        console.print(f"wrote {file}", highlight=False)
+
+
 @app.command()
 def compact(store: StorePath) -> None:
     """Merge the parts of a store into large ones."""

@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
+from trajopt.simulate.climb import wilson
 from trajopt.study.store import open_store
 
 DOTS = 150  # dots per inch of saved pictures
@@ -48,24 +49,37 @@ def heat_map(frame: pd.DataFrame, x: str, y: str, value: str) -> Figure:
 
 def lines(frame: pd.DataFrame, x: str, value: str, by: str | None = None) -> Figure:
     """Median of ``value`` over ``x``, a line for each value of ``by``, with bands from the 10th to the 90th
-    percentile. Finished cases only. Raises ArgumentError as ``heat_map``."""
+    percentile; for a value that is only 0 or 1 (or a boolean) the share of ones with Wilson's 95 % interval.
+
+    Finished cases only. Raises ArgumentError as ``heat_map``.
+    """
     rows = _done(frame, (x, value) if by is None else (x, value, by))
+    rows = rows.assign(**{value: rows[value].astype(float)})
+    yes_or_no = bool(rows[value].isin([0.0, 1.0]).all())
     figure = Figure(figsize=(7.0, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     for name, group in [("", rows)] if by is None else list(rows.groupby(by)):
-        places = group.groupby(x)[value]
-        middle = places.median().astype(float)
-        low, high = (places.apply(lambda v, p=p: float(np.percentile(v.astype(float), p))) for p in INTERVAL)
+        bands = [(place, *(_share(v) if yes_or_no else _median(v))) for place, v in group.groupby(x)[value]]
+        places, middle, low, high = zip(*bands, strict=True)
         label = None if by is None else f"{by} = {_short(name)}"
-        line, = axes.plot(middle.index, middle, marker="o", markersize=4, label=label)
-        axes.fill_between(middle.index, low, high, color=line.get_color(), alpha=0.18, linewidth=0)
+        line, = axes.plot(places, middle, marker="o", markersize=4, label=label)
+        axes.fill_between(places, low, high, color=line.get_color(), alpha=0.18, linewidth=0)
     axes.set_xlabel(x)
-    axes.set_ylabel(f"{value} (median, 10-90 %)")
+    axes.set_ylabel(f"{value} (share, 95 % interval)" if yes_or_no else f"{value} (median, 10-90 %)")
     axes.grid(alpha=0.3)
     if by is not None:
         axes.legend()
     return figure
+
+
+def _median(values: pd.Series) -> tuple[float, float, float]:
+    low, middle, high = np.percentile(values, (INTERVAL[0], 50.0, INTERVAL[1]))
+    return float(middle), float(low), float(high)
+
+
+def _share(values: pd.Series) -> tuple[float, float, float]:
+    return (float(values.mean()), *wilson(int(values.sum()), len(values)))
 
 
 def pairs(frame: pd.DataFrame, columns: Sequence[str]) -> Figure:

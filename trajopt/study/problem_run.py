@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from trajopt.errors import ArgumentError
 from trajopt.maneuver_problem import ManeuverProblem
 from trajopt.problem import Problem
 from trajopt.study.cases import Case
+
+if TYPE_CHECKING:
+    from trajopt.pipeline import Solution
+    from trajopt.simulate.check import ValidationReport
 
 RUN_NAMES = ("run.optimizer", "run.seed", "run.engine", "run.evaluations")
 ENGINES = ("none", "pybullet", "mujoco")
@@ -45,33 +49,46 @@ class ProblemRun:
     options: SolveOptions
 
     def __call__(self, case: Case) -> dict[str, Any]:
-        from trajopt.optimize.base import Budget
-        from trajopt.pipeline import solve, validate
-
-        problem = self.problem.replace(changes(case.values))
-        evaluations = int(case.values.get("run.evaluations", self.options.evaluations))
-        solution = solve(problem, optimizer=str(case.values.get("run.optimizer", self.options.optimizer)),
-                         seed=int(case.values.get("run.seed", case.seed)),
-                         budget=Budget(evaluations=evaluations) if evaluations else None)
+        solution = self.solution(case)
         row: dict[str, Any] = {
             "cost": solution.cost, "terms": solution.terms, "evaluations": solution.evaluations,
             "holds": solution.holds, "faults": "; ".join(solution.faults), "search": solution.search.status,
             "margins": solution.margins, "pose_error": np.asarray(solution.deviation).tolist(),
             "wheel_error": np.asarray(solution.wheel_deviation).tolist(), "control_points": solution.control_points,
         }
-        trajectory = solution.trajectory
-        if trajectory is None:
-            return row
-        row["duration"] = trajectory.duration
-        engine = str(case.values.get("run.engine", self.options.engine))
-        if engine != "none":
-            report = validate(trajectory, problem, engine=engine)
+        if solution.trajectory is not None:
+            row["duration"] = solution.trajectory.duration
+        report = self.driven(case, solution)
+        if report is not None:
             row["driven"] = {"along": report.along, "across": report.across, "yaw": report.yaw,
                              "wheel_error": np.asarray(report.wheel_deviation).tolist(),
                              "path_rms": report.path_rms, "path_max": report.path_max}
             row["driven_pose"] = report.recording.pose
             row["driven_times"] = report.recording.times
         return row
+
+    def seed(self, case: Case) -> int:
+        """The seed with which a case is solved."""
+        return int(case.values.get("run.seed", case.seed))
+
+    def solution(self, case: Case) -> Solution:
+        """The solved problem of a case; every call finds the same."""
+        from trajopt.optimize.base import Budget
+        from trajopt.pipeline import solve
+
+        evaluations = int(case.values.get("run.evaluations", self.options.evaluations))
+        return solve(self.problem.replace(changes(case.values)), seed=self.seed(case),
+                     optimizer=str(case.values.get("run.optimizer", self.options.optimizer)),
+                     budget=Budget(evaluations=evaluations) if evaluations else None)
+
+    def driven(self, case: Case, solution: Solution) -> ValidationReport | None:
+        """The solution in physics; None where the case has no engine, or the solution no trajectory."""
+        from trajopt.pipeline import validate
+
+        engine = str(case.values.get("run.engine", self.options.engine))
+        if engine == "none" or solution.trajectory is None:
+            return None
+        return validate(solution.trajectory, solution.problem, engine=engine)
 
 
 def changes(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -144,6 +144,7 @@ def arrow() -> Any:
     """The pyarrow module. Raises MissingDependencyError."""
     try:
         import pyarrow
+        import pyarrow.compute
     except ImportError:
         raise MissingDependencyError("pyarrow", "sweep", "storing sweeps") from None
     return pyarrow

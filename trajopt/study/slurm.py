@@ -96,6 +96,8 @@ def submit(table: CaseTable, run: RunFunction, store: Store, *, limits: CaseLimi
     store.write_text(f"jobs/{folder.name}/array.sh", script)
     run_id = record_run(store, table, len(places), name_of(run), f"Slurm array of {count}", source, limits)
     job = _sbatch(folder / "array.sh", wait)
+    if wait:
+        store.align()
     close_record(store, run_id, f"submitted as job {job}", {})
     return Submission(job, count, len(places), folder)
 

@@ -30,12 +30,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.errors import TrajoptError
+from trajopt.study.merging import common_schema, conformed, one_array_a_name, one_row_a_case, united
 from trajopt.study.rows import DONE, RUN_COLUMNS, arrow
 
 FORMAT = 1
 _STALE = 24 * 3600.0  # s after which a temporary file's writer is taken for dead; chosen
 _READ_TRIES = 100  # listings of the parts before giving up, while compactions go on meanwhile; chosen
 _COMPACT_ROWS = 1_000_000  # rows of one compacted part, to bound memory; chosen
+_ALIGNED_TOGETHER = 100  # parts of at most 10,000 rows that become one when their columns are completed; chosen
 
 
 class StoreError(TrajoptError):
@@ -60,6 +62,8 @@ class Store:
         unique = f"{name}-{uuid.uuid4().hex[:12]}.parquet"
         temporary = self.path / "temporary" / unique
         try:
+            for place in (temporary.parent, self.path / folder):  # git and some copies drop empty directories
+                place.mkdir(exist_ok=True)
             with open(temporary, "wb") as file:
                 pq.write_table(table, file, compression="zstd")
                 file.flush()
@@ -76,6 +80,7 @@ class Store:
         temporary = self.path / "temporary" / f"text-{uuid.uuid4().hex}"
         target = self.path / place
         try:
+            temporary.parent.mkdir(exist_ok=True)
             target.parent.mkdir(parents=True, exist_ok=True)
             with open(temporary, "w", encoding="utf-8") as file:
                 file.write(text)
@@ -98,7 +103,7 @@ class Store:
 
         ``columns`` limits what is read (case and status always are). Raises StoreError for a damaged part.
         """
-        return _one_row_a_case(self._union("parts", columns))
+        return one_row_a_case(self._union("parts", columns))
 
     def stable_table(self) -> Any:
         """``table`` without the columns of time, host and path: equal for equal sweeps, however they ran."""
@@ -168,7 +173,7 @@ class Store:
             raise StoreError(f"{self.path}: compactions go on without end; read when they are done")
         if not tables:
             return pa.table({"case": pa.array([], pa.string()), "status": pa.array([], pa.string())})
-        return pa.concat_tables(tables.values(), promote_options="permissive")
+        return united(list(tables.values()))
 
     # -- upkeep ---------------------------------------------------------------------------------------
 
@@ -191,29 +196,46 @@ class Store:
                     except FileNotFoundError:  # another compaction was here
                         continue
                 if batch and (file is None or rows + count > _COMPACT_ROWS):
-                    self._merge(folder, batch)
+                    if len(batch) > 1:
+                        self._merge(folder, batch)
                     batch, rows = [], 0
                 if file is not None:
                     batch.append(file)
                     rows += count
-        for leftover in (self.path / "temporary").iterdir():
+        for leftover in (self.path / "temporary").glob("*"):
             with _gone_is_fine():
                 if time.time() - leftover.stat().st_mtime > _STALE:
                     leftover.unlink()
+        self.align()
         return before, len(self.parts())
 
-    def _merge(self, folder: str, files: Sequence[Path]) -> None:
-        if len(files) < 2:
-            return
+    def align(self) -> None:
+        """Give all parts the same columns and types, as readers want that take the directory as it is.
+
+        Parts differ where only some cases have a result. Those that lack a column are merged into one that has it.
+        """
+        import pyarrow.parquet as pq
+
+        schemas = {}
+        for file in self.parts():
+            with _gone_is_fine():
+                schemas[file] = pq.read_schema(file)
+        common = common_schema(schemas.values())
+        columns = {f.name: f.type for f in common}
+        odd = [file for file, schema in schemas.items() if {f.name: f.type for f in schema} != columns]
+        for start in range(0, len(odd), _ALIGNED_TOGETHER):
+            self._merge("parts", odd[start : start + _ALIGNED_TOGETHER], common)
+
+    def _merge(self, folder: str, files: Sequence[Path], schema: Any = None) -> None:
         import pyarrow.parquet as pq
 
         try:
             tables = [pq.read_table(f, use_threads=False, memory_map=False) for f in files]
         except FileNotFoundError:  # another compaction was here
             return
-        table = arrow().concat_tables(tables, promote_options="permissive")
-        table = _one_row_a_case(table) if folder == "parts" else _one_array_a_name(table)
-        self.write_part(folder, "compact", table)
+        table = united(tables)
+        table = one_row_a_case(table) if folder == "parts" else one_array_a_name(table)
+        self.write_part(folder, "compact", table if schema is None else conformed(table, schema))
         for file in files:
             file.unlink(missing_ok=True)
 
@@ -252,29 +274,6 @@ def open_store(path: str | Path | Store, *, create: bool = True) -> Store:
         raise StoreError(f"{place}: store of format {version!r}, but this version reads and writes format {FORMAT}; "
                          "use the trajopt version that wrote it (see runs/*.json), or another directory")
     return Store(place)
-
-
-def _one_row_a_case(table: Any) -> Any:
-    """Sorted by case; of several rows of a case the finished one, else the latest."""
-    if len(table) == 0:
-        return table
-    compute = arrow().compute
-    keys = arrow().table({"case": table["case"], "failed": compute.not_equal(table["status"], DONE)})
-    order = [("case", "ascending"), ("failed", "ascending")]
-    if "run_started" in table.column_names:
-        keys = keys.append_column("started", table["run_started"])
-        order.append(("started", "descending"))
-    places = compute.sort_indices(keys, sort_keys=order)
-    cases = keys["case"].take(places).combine_chunks()
-    first = np.ones(len(cases), dtype=bool)
-    first[1:] = compute.not_equal(cases[1:], cases[:-1]).to_numpy(zero_copy_only=False)
-    return table.take(places.filter(arrow().array(first)))
-
-
-def _one_array_a_name(table: Any) -> Any:
-    frame = table.select(["case", "name"]).to_pandas()
-    kept = np.flatnonzero(~frame.duplicated(keep="last").to_numpy())
-    return table.take(arrow().array(kept)).sort_by([("case", "ascending"), ("name", "ascending")])
 
 
 def _sync_directory(path: Path) -> None:

@@ -70,6 +70,7 @@ def sweep(cases: CaseTable | Iterable[Mapping[str, Any]] | Mapping[str, NDArray[
     try:
         if len(places):
             drive.go()
+            place.align()
         outcome = "finished"
     except KeyboardInterrupt:
         outcome = "interrupted"

@@ -1,0 +1,39 @@
+"""The climb rate study: its trial is sub-test 2 as ``run_climb`` drives it."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.study.crashes import ROOT
+from trajopt.errors import ArgumentError
+from trajopt.maneuver import configurations
+from trajopt.simulate.climb import Climb, Outcome, run_climb
+from trajopt.study import climb_study
+from trajopt.study.cases import Case
+from trajopt.study.sweepfile import load_sweep
+
+
+def test_a_trial_is_the_climb_without_shortcuts(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    plan = load_sweep(ROOT / "problems" / "sweeps" / "climb_rate.toml")
+    assert len(plan.table) == 6000
+    case = plan.table.rows()[4321]
+    short = plan.run(case)
+
+    def plain(climb: Climb, engine: str) -> Outcome:
+        return run_climb(climb, engine)
+
+    monkeypatch.setattr(climb_study, "_outcome", plain)
+    assert plan.run(case) == short
+    assert short["climbed"] in (0.0, 1.0)
+
+
+def test_all_configurations_of_the_study_are_there_and_others_are_named() -> None:
+    plan = load_sweep(ROOT / "problems" / "sweeps" / "climb_rate.toml")
+    problem = plan.run.problem  # type: ignore[attr-defined]
+    wanted = {row["configuration"] for row in plan.table.rows()}
+    for height in {row["obstacle.height"] for row in plan.table.rows()}:
+        step = problem.replace({"obstacle.height": height}).obstacle
+        assert wanted <= {c.name for c in configurations(problem.robot.wheel, step)}
+    with pytest.raises(ArgumentError, match="lateral left"):
+        climb_study.trial(Case("0" * 32, {"configuration": "on its head"}), problem)
