@@ -1,11 +1,13 @@
 """What a sweep costs beside the work itself: our process pool next to joblib and Dask.
 
-    python -m benchmarks.sweep_overhead [--quick] [--million]
+    python -m benchmarks.sweep_overhead [--quick] [--part pool|dask|million]
 
 Cases wait 5 ms each. Overhead a case = (wall time x workers - work) / cases, taken from the difference between a
 long and a short sweep, so that the start of workers cancels; work is the sum of the times that the cases themselves
-took, so that a late timer is not counted. Ours also writes every row to disk; joblib and Dask return results in
-memory. ``--million`` plans, runs and reads 1,000,000 empty cases.
+took, so that a late timer is not counted. Such pairs are repeated; the table shows median, least and largest. Waiting
+costs no processor time, so the processor time a case, of all processes together, is overhead too. A bare pool that
+only runs the cases is measured the same way. Ours also writes every row to disk; the others return results in memory.
+``--part million`` plans, runs and reads 1,000,000 empty cases.
 """
 
 from __future__ import annotations
@@ -13,10 +15,14 @@ from __future__ import annotations
 import argparse
 import resource
 import shutil
+import statistics
 import tempfile
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +67,15 @@ def ours(cases: int, engine: Engine) -> tuple[float, float]:
     return wall, float(values.sum())
 
 
+def bare(cases: int, chunk: int) -> tuple[float, float]:
+    """The same cases in a process pool of their own, and nothing else."""
+    begun = time.perf_counter()
+    blocks = [list(range(i, min(i + chunk, cases))) for i in range(0, cases, chunk)]
+    with ProcessPoolExecutor(WORKERS, mp_context=get_context("spawn")) as pool:
+        values = [v for block in pool.map(_paced_many, blocks) for v in block]
+    return time.perf_counter() - begun, float(np.sum(values))
+
+
 def joblib(cases: int, batch: int | str) -> tuple[float, float]:
     from joblib import Parallel, delayed
 
@@ -80,13 +95,27 @@ def dask(cases: int, chunk: int) -> tuple[float, float]:
     return time.perf_counter() - begun, float(np.sum([v for b in values for v in b]))
 
 
-TRIALS: tuple[tuple[str, Callable[[int], tuple[float, float]]], ...] = (
-    ("trajopt, process pool, rows on disk", lambda n: ours(n, processes(WORKERS))),
-    ("trajopt, Dask, rows on disk", lambda n: ours(n, dask_local(WORKERS))),
-    ("joblib, loky, automatic batches", lambda n: joblib(n, "auto")),
-    ("joblib, loky, one by one", lambda n: joblib(n, 1)),
-    ("Dask, chunks of 100", lambda n: dask(n, 100)),
-    ("Dask, one by one", lambda n: dask(n, 1)),
+@dataclass(frozen=True)
+class Trial:
+    """A way to run cases: their number -> wall time and work, s. ``pairs`` of a short and a ``long`` run."""
+
+    name: str
+    run: Callable[[int], tuple[float, float]]
+    pairs: int = 3
+    long: int = 4400
+
+
+SHORT = 400  # cases of the short run
+POOL = (
+    Trial("trajopt, process pool, rows on disk", lambda n: ours(n, processes(WORKERS))),
+    Trial("bare process pool, chunks of 100", lambda n: bare(n, 100)),
+    Trial("joblib, loky, automatic batches", lambda n: joblib(n, "auto")),
+)
+DASK = (
+    Trial("trajopt, Dask, rows on disk", lambda n: ours(n, dask_local(WORKERS))),
+    Trial("Dask, chunks of 100", lambda n: dask(n, 100)),
+    Trial("Dask, one by one", lambda n: dask(n, 1), 1, 800),
+    Trial("joblib, loky, one by one", lambda n: joblib(n, 1), 1),
 )
 
 
@@ -96,25 +125,34 @@ def cpu_seconds() -> float:
     return sum(u.ru_utime + u.ru_stime for u in used)
 
 
-def overhead_table(short: int, long: int) -> ResultTable:
+def overhead_table(name: str, trials: tuple[Trial, ...], quick: bool) -> ResultTable:
     rows = []
-    for name, trial in TRIALS:
+    for trial in trials:
+        long = 2 * SHORT if quick else trial.long
         try:
-            before = cpu_seconds()
-            wall, work = trial(short)
-            middle = cpu_seconds()
-            wall_long, work_long = trial(long)
-            cpu = 1e3 * (cpu_seconds() - 2 * middle + before) / (long - short)
+            pairs = [_pair(trial, long) for _ in range(1 if quick else trial.pairs)]
         except ImportError as error:
-            rows.append((name, "not installed", str(error), "", ""))
+            rows.append((trial.name, "not installed", str(error), "", "", "", ""))
             continue
-        lost = 1e3 * ((wall_long - wall) * WORKERS - (work_long - work)) / (long - short)
-        start = wall - work / WORKERS - 1e-3 * lost * short / WORKERS
-        took = 1e3 * (work_long - work) / (long - short)
-        rows.append((name, f"{lost:.3f}", f"{cpu:.3f}", f"{start:.2f}", f"{took:.2f}"))
-    return ResultTable(f"{short} and {long} cases of 5 ms on {WORKERS} workers (target <= {TARGET} ms a case)",
-                       ("engine", "overhead a case, ms", "CPU time a case, ms", "start and end, s", "a case took, ms"),
-                       rows)
+        lost, cpu, start, took = (sorted(column) for column in zip(*pairs, strict=True))
+        rows.append((trial.name, f"{statistics.median(lost):.3f}", f"{lost[0]:.3f} .. {lost[-1]:.3f}",
+                     f"{statistics.median(cpu):.3f}", f"{statistics.median(start):.2f}",
+                     f"{statistics.median(took):.2f}", str(len(pairs))))
+    return ResultTable(f"{name}: {WORKERS} workers, cases of 5 ms (target <= {TARGET} ms a case)",
+                       ("engine", "overhead a case, ms", "least .. largest", "CPU time a case, ms",
+                        "start and end, s", "a case took, ms", "pairs"), rows)
+
+
+def _pair(trial: Trial, long: int) -> tuple[float, float, float, float]:
+    """Overhead a case (ms), processor time a case (ms), start and end (s), time that a case itself took (ms)."""
+    before = cpu_seconds()
+    wall, work = trial.run(SHORT)
+    middle = cpu_seconds()
+    wall_long, work_long = trial.run(long)
+    cpu = 1e3 * (cpu_seconds() - 2 * middle + before) / (long - SHORT)
+    lost = 1e3 * ((wall_long - wall) * WORKERS - (work_long - work)) / (long - SHORT)
+    start = wall - work / WORKERS - 1e-3 * lost * SHORT / WORKERS
+    return lost, cpu, start, 1e3 * (work_long - work) / (long - SHORT)
 
 
 class PeakMemory:
@@ -176,13 +214,18 @@ def million_table(cases: int) -> ResultTable:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="few cases, and 20,000 empty ones")
-    parser.add_argument("--million", action="store_true", help="1,000,000 empty cases too")
+    parser.add_argument("--quick", action="store_true", help="few cases, one pair, and 20,000 empty ones")
+    parser.add_argument("--part", choices=("pool", "dask", "million"), help="one part; its own files in out/benchmarks")
     options = parser.parse_args()
-    tables = [overhead_table(400, 800 if options.quick else 4400)]
-    if options.quick or options.million:
+    tables = []
+    if options.part in (None, "pool"):
+        tables.append(overhead_table("Process pool", POOL, options.quick))
+    if options.part in (None, "dask"):
+        tables.append(overhead_table("Dask, and one by one", DASK, options.quick))
+    if options.part in (None, "million"):
         tables.append(million_table(20_000 if options.quick else 1_000_000))
-    publish("sweep_overhead", tables, packages=("numpy", "pyarrow", "joblib", "distributed"))
+    publish("sweep_overhead" + (f"_{options.part}" if options.part else ""), tables,
+            packages=("numpy", "pyarrow", "joblib", "distributed"))
 
 
 if __name__ == "__main__":

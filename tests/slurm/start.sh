@@ -8,6 +8,7 @@
 SLURM_TEST_DIR="${1:-/tmp/trajopt-slurm}"
 host="$(hostname -s)"
 cpus="$(nproc)"
+memory="$(awk '/MemTotal/ { m = int(0.8 * $2 / 1024); print (m < 4000 ? m : 4000) }' /proc/meminfo)"  # MB
 mkdir -p "$SLURM_TEST_DIR/state" "$SLURM_TEST_DIR/spool" "$SLURM_TEST_DIR/munge"
 chmod 755 "$SLURM_TEST_DIR"
 chmod 700 "$SLURM_TEST_DIR/munge"
@@ -41,7 +42,7 @@ SlurmdPidFile=$SLURM_TEST_DIR/slurmd.pid
 SlurmctldLogFile=$SLURM_TEST_DIR/slurmctld.log
 SlurmdLogFile=$SLURM_TEST_DIR/slurmd.log
 KillWait=5
-NodeName=$host NodeAddr=127.0.0.1 CPUs=$cpus RealMemory=4000 State=UNKNOWN
+NodeName=$host NodeAddr=127.0.0.1 CPUs=$cpus RealMemory=$memory State=UNKNOWN
 PartitionName=test Nodes=$host Default=YES MaxTime=INFINITE State=UP
 CONF
 export SLURM_CONF="$SLURM_TEST_DIR/slurm.conf"
@@ -61,4 +62,5 @@ done
 sinfo --noheader --format=%T 2>/dev/null | grep -qE 'idle|mixed|allocated' || {
     echo "Slurm did not start; see $SLURM_TEST_DIR/*.log" >&2
     tail -n 5 "$SLURM_TEST_DIR"/*.log >&2
+    false
 }

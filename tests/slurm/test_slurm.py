@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from tests.study.crashes import cases, digest, torment_slurm
-from tests.study.run_functions import mixed, paced
-from trajopt.study.engines import dask_slurm
+from tests.study.run_functions import paced, paced_mixed
+from tests.study.same_table import swept
 from trajopt.study.host import CaseLimits
 from trajopt.study.slurm import SlurmOptions, submit
 from trajopt.study.store import open_store
-from trajopt.study.sweeps import sweep, tabled
+from trajopt.study.sweeps import tabled
 
 LIMITS = CaseLimits(60.0, 0)
 
@@ -36,16 +36,24 @@ def slurm() -> None:
         pytest.skip("no Slurm answers here: . tests/slurm/start.sh starts one on loopback")
 
 
+@pytest.fixture(scope="module")
+def table_of_one_process(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return digest(swept("one", 2000, tmp_path_factory.mktemp("one")))
+
+
 @pytest.mark.slow
-def test_an_array_gives_the_same_table(tmp_path: Path) -> None:
-    store = open_store(tmp_path / "array")
-    table = tabled(cases(300), mixed, None, None)
-    done = submit(table, mixed, store, limits=LIMITS, wait=True, case_seconds=0.05,
-                  options=SlurmOptions(elements=2, memory="500M"))
-    assert (done.elements, done.cases) == (2, 300)
-    assert digest(store) == digest(sweep(cases(300), mixed, executor=1, store=tmp_path / "one"))
-    again = submit(table, mixed, store, limits=LIMITS, options=SlurmOptions(), case_seconds=0.05)
+def test_an_array_gives_the_same_table(tmp_path: Path, table_of_one_process: str) -> None:
+    store = swept("slurm", 2000, tmp_path)
+    assert digest(store) == table_of_one_process
+    table = tabled(cases(2000), paced_mixed, None, None)
+    again = submit(table, paced_mixed, store, limits=LIMITS, options=SlurmOptions(), case_seconds=0.05)
     assert (again.job, again.cases) == ("", 0)
+
+
+@pytest.mark.slow
+def test_dask_on_slurm_gives_the_same_table(tmp_path: Path, table_of_one_process: str) -> None:
+    pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is not installed")
+    assert digest(swept("dask-slurm", 2000, tmp_path)) == table_of_one_process
 
 
 @pytest.mark.slow
@@ -64,14 +72,6 @@ def test_a_requeued_element_goes_on(tmp_path: Path) -> None:
         time.sleep(0.5)
     assert store.counts() == {"done": 2000}
     subprocess.run(["scancel", done.job], check=False)
-
-
-@pytest.mark.slow
-def test_dask_on_slurm_gives_the_same_table(tmp_path: Path) -> None:
-    pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is not installed")
-    store = sweep(cases(200), mixed, executor=dask_slurm(1, memory="1GB", directory=str(tmp_path)),
-                  store=tmp_path / "dask")
-    assert digest(store) == digest(sweep(cases(200), mixed, executor=1, store=tmp_path / "one"))
 
 
 @pytest.mark.slow
