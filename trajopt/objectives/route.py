@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 SEARCH_STEPS = 160  # steps along the route for obstacles and walls, chosen: 8 cm on 12 m
 FINE_STEPS = 1600  # the same when a route is judged
 RESERVE = 0.004  # m, chosen: more than a disc of 1 m comes nearer between two search steps (sagitta of step and path)
-SEARCH_CELLS = 60  # intervals of the speed profile in a search, chosen: duration within 0.1 %
+SEARCH_CELLS = 60  # intervals of the speed profile in a search, chosen
 _STANDING = 1e-6  # of the mean rate: a slower place has no direction of travel
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(4)
 
@@ -56,7 +56,7 @@ class RouteObjective:
 
     ``values`` (size, 2): control values of ``basis``, m. ``free``: which of them a search moves, and ``bounds``
     (2 len(free), 2) between which numbers: decision variables are x, y of each in turn. ``radius``: of the disc
-    that covers the robot, m. Durations start and end at rest.
+    that covers the robot, m. ``cells``: of the speed profile in a search. Durations start and end at rest.
     """
 
     kind: Literal["length", "duration"]
@@ -68,6 +68,7 @@ class RouteObjective:
     limits: tuple[Limit, ...] = ()
     corridor: Corridor = Corridor()
     radius: float = 0.0
+    cells: int = SEARCH_CELLS
 
     @property
     def dimension(self) -> int:
@@ -105,8 +106,16 @@ class RouteObjective:
 
     @cached_property
     def _cells(self) -> tuple[Array, list[Array], Array, Array]:
-        """Grid (G,), its matrices of derivatives 0 to 3, and matrix and weights of Gauss points in its cells."""
-        u = np.linspace(self.basis.knots[0], self.basis.knots[-1], SEARCH_CELLS + 1)
+        """Grid (G,), its matrices of derivatives 0 to 3, and matrix and weights of Gauss points in its cells.
+
+        Inner knots, where the third derivative jumps, are there twice: a cell of no length lies between.
+        """
+        knots = np.array(self.basis.knots)
+        cells = max(4, self.cells // (len(knots) - 1))
+        parts = [np.linspace(a, b, cells + 1) for a, b in zip(knots[:-1], knots[1:], strict=True)]
+        for part in parts:
+            part[-1] = np.nextafter(part[-1], -np.inf)
+        u = np.concatenate(parts)
         half = np.diff(u)[:, None] / 2
         gauss = u[:-1, None] + half * (1 + _GAUSS_X)
         return (u, [self.basis.matrix(u, k) for k in range(4)], self.basis.matrix(gauss.ravel(), 1),

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import ClassVar, NoReturn, Protocol
+from typing import ClassVar, Literal, NoReturn, Protocol
 
 import numpy as np
 from numpy.random import Generator
@@ -37,6 +37,7 @@ class Status(Enum):
 
     TARGET = "the target was reached"
     CONVERGED = "the method's own stopping rule was met"
+    STALLED = "the method gave up before its own stopping rule was met; start it elsewhere, or loosen its tolerance"
     EVALUATIONS = "the budget of evaluations is used up; raise Budget.evaluations to search longer"
     SECONDS = "the budget of seconds is used up; raise Budget.seconds to search longer"
     INFEASIBLE = "no feasible candidate was found; widen the bounds or free more variables"
@@ -46,11 +47,16 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Budget:
-    """What a search may use: objective ``evaluations``, wall-clock ``seconds``, and a cost ``target`` that ends it."""
+    """What a search may use: objective ``evaluations``, ``seconds``, and a cost ``target`` that ends it.
+
+    ``clock`` says which seconds, also in histories and results: "wall", or "cpu" for processor time of this
+    process, which other load on the machine does not change.
+    """
 
     evaluations: int | None = DEFAULT_EVALUATIONS
     seconds: float | None = None
     target: float | None = None
+    clock: Literal["wall", "cpu"] = "wall"
 
     def __post_init__(self) -> None:
         whole = isinstance(self.evaluations, (int, np.integer)) and not isinstance(self.evaluations, bool)
@@ -60,6 +66,8 @@ class Budget:
             raise ArgumentError("budget.seconds", self.seconds, "a finite time > 0 s, or None")
         if self.target is not None and not (_is_real(self.target) and not np.isnan(self.target)):
             raise ArgumentError("budget.target", self.target, "a cost, or None")
+        if self.clock not in ("wall", "cpu"):
+            raise ArgumentError("budget.clock", self.clock, "wall or cpu")
         if self.evaluations is None and self.seconds is None:
             raise ArgumentError("budget", "unlimited", "a limit on evaluations or on seconds")
 
@@ -85,7 +93,9 @@ class OptimizeResult:
     ``fun`` and ``violation`` are recomputed by the objective at ``x`` after the search, more finely than the
     search saw it where the objective can (``search_fun`` is what the search saw). ``failures`` counts
     evaluations that raised or were not finite; ``first_failure`` says what the first one was. ``ngev`` counts
-    exact gradients, which are not among ``nfev`` (finite differences are).
+    exact gradients and ``nhev`` exact Hessians, which are not among ``nfev`` (finite differences are).
+    ``seconds`` are those of the budget's clock, without ``construct_seconds``: what it took before to write a
+    program in symbols, say.
     """
 
     x: Array
@@ -103,6 +113,8 @@ class OptimizeResult:
     failures: int = 0
     first_failure: str = ""
     ngev: int = 0
+    nhev: int = 0
+    construct_seconds: float = 0.0
 
 
 class Optimizer(Protocol):
@@ -132,6 +144,8 @@ class Run:
     nfev: int = 0
     nit: int = 0
     ngev: int = 0
+    nhev: int = 0
+    construct_seconds: float = 0.0
     failures: int = 0
     first_failure: str = ""
     best_x: Array | None = None
@@ -141,7 +155,10 @@ class Run:
     _rows: list[tuple[int, float, float, float]] = field(default_factory=list)
     _samples: list[Array] = field(default_factory=list)
     _kept: int = 0
-    _started: float = field(default_factory=time.perf_counter)
+    _started: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._started = self._now()
 
     # -- evaluating -----------------------------------------------------------------------------------
 
@@ -235,9 +252,18 @@ class Run:
         """Enter a candidate (d,) into the final judgement, whatever its cost on the search grid is."""
         self._proposals.append(np.clip(candidate, self.bounds[:, 0], self.bounds[:, 1]))
 
+    def constructed(self) -> None:
+        """Start the clock anew: what went before was construction, which is told apart from the search."""
+        self.construct_seconds = self.elapsed
+        self._started = self._now()
+
     @property
     def elapsed(self) -> float:
-        return time.perf_counter() - self._started
+        """Seconds since the search began, by the budget's clock."""
+        return self._now() - self._started
+
+    def _now(self) -> float:
+        return time.perf_counter() if self.budget.clock == "wall" else time.process_time()
 
     def remaining(self) -> int:
         """Evaluations left (a large number when unlimited)."""
@@ -283,7 +309,34 @@ class Run:
                           np.concatenate(self._samples) if self._samples else np.zeros((0, len(self.bounds))))
         return OptimizeResult(
             x, fun, violation, self.best_cost, self.nfev, self.nit, status in (Status.TARGET, Status.CONVERGED),
-            status, text, optimizer, history, self.elapsed, self.failures, self.first_failure, self.ngev)
+            status, text, optimizer, history, self.elapsed, self.failures, self.first_failure, self.ngev,
+            self.nhev, self.construct_seconds)
+
+
+@dataclass
+class Starts:
+    """Which start of a local method gave the best candidate, and what the method said of it."""
+
+    run: Run
+    converged: bool = False
+    said: str = "nothing was found"
+    tried: int = 0
+    kept: int = 0  # starts that converged
+    _best: tuple[float, float] = (np.inf, np.inf)
+
+    def ended(self, converged: bool, said: str) -> None:
+        """A start is over; the method says whether by its own stopping rule, and what."""
+        self.tried += 1
+        self.kept += converged
+        now = self.run.best_cost, self.run.best_violation
+        if self.tried == 1 or better(*now, *self._best):
+            self.converged, self.said = converged, said.strip().rstrip(".")
+        self._best = now
+
+    def verdict(self) -> tuple[Status, str]:
+        """The status of the start that found the best, and a sentence on all."""
+        status = Status.CONVERGED if self.converged else Status.STALLED
+        return status, f"{self.kept} of {self.tried} starts converged; the best said '{self.said}'"
 
 
 def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:

@@ -56,19 +56,31 @@ def _left(budget: Budget, used: OptimizeResult) -> Budget | None:
 
 def _joined(name: str, first: OptimizeResult, second: OptimizeResult) -> OptimizeResult:
     best = second if better(second.fun, second.violation, first.fun, first.violation) else first
+    seen = second if _found_better(second, first) else first  # what the searches themselves saw
     a, b = first.history, second.history
-    floor = (a.cost[-1], a.violation[-1]) if len(a.cost) else (np.inf, np.inf)
-    later = np.array([better(c, v, *floor) for c, v in zip(b.cost, b.violation, strict=True)], dtype=bool)
+    later = np.zeros(len(b.cost), dtype=bool)  # improvements of the second search that are ones of both
+    if len(a.cost):
+        later[:] = [better(c, v, a.cost[-1], a.violation[-1]) for c, v in zip(b.cost, b.violation, strict=True)]
+    else:
+        later[:] = True
     history = replace(
         a, evaluations=np.concatenate([a.evaluations, b.evaluations[later] + first.nfev]),
         seconds=np.concatenate([a.seconds, b.seconds[later] + first.seconds]),
         cost=np.concatenate([a.cost, b.cost[later]]), violation=np.concatenate([a.violation, b.violation[later]]),
         samples=np.concatenate([a.samples, b.samples])[: 50_000])
     return replace(best, optimizer=name, nfev=first.nfev + second.nfev, nit=first.nit + second.nit,
+                   ngev=first.ngev + second.ngev, nhev=first.nhev + second.nhev,
                    seconds=first.seconds + second.seconds, history=history, status=second.status,
-                   success=second.success, search_fun=min(first.search_fun, second.search_fun),
+                   success=second.success, search_fun=seen.search_fun,
                    failures=first.failures + second.failures, message=f"swarm, then slsqp: {second.message}",
                    first_failure=first.first_failure or second.first_failure)
+
+
+def _found_better(one: OptimizeResult, other: OptimizeResult) -> bool:
+    """Whether the best that ``one`` saw beats what ``other`` saw, by Deb's rule."""
+    if not len(one.history.cost) or not len(other.history.cost):
+        return len(one.history.cost) > 0
+    return better(one.history.cost[-1], one.history.violation[-1], other.history.cost[-1], other.history.violation[-1])
 
 
 def hybrid() -> Hybrid:

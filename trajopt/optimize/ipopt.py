@@ -26,7 +26,7 @@ from trajopt.objectives.base import (
     SymbolicObjective,
     SymbolicProblem,
 )
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Starts, Status, checked_bounds, checked_x0
 from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
 from trajopt.optimize.newton import solve_residuals
 
@@ -56,33 +56,35 @@ class Ipopt:
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
                  rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Search. ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the history, and
-        the polish. Raises ArgumentError when the objective cannot be written in symbols."""
+        the polish; ``ngev`` and ``nhev`` its gradients and Hessians. Raises ArgumentError when the objective cannot be written in symbols."""
         box = checked_bounds(bounds, objective.dimension)
         start = checked_x0(x0, box)
         run = Run(objective, box, budget, progress)
         program = _Program.of(self, run, cast(SymbolicObjective, objective))
+        run.constructed()
         return run.finish(self.name, lambda: self._search(run, program, start, rng))
 
     def _search(self, run: Run, program: _Program, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         residual = Capability.RESIDUALS in run.objective.provides
-        successes = tried = 0
+        successes, starts = 0, Starts(run)
         for start in self._starts(run, x0, rng):
-            tried += 1
             x = program.solve(start)
             if self.polish and residual:
                 with_residuals = cast(ResidualObjective, run.objective)
                 turns = with_residuals.nearest_turns(x[None])[0]
                 x = solve_residuals(run, with_residuals, x, turns, iterations=12).x
             run.propose(x)
+            stats = program.solver.stats()
+            starts.ended(bool(stats["success"]), str(stats["return_status"]))
             if residual:
                 exact = float(run.objective.score(x).cost[0]) <= EXACT
                 successes += exact
                 if exact and self.stop_when_exact:
                     break
         if not residual:
-            return Status.CONVERGED, f"{tried} starts"
+            return starts.verdict()
         status = Status.CONVERGED if successes else Status.NO_EXACT
-        return status, f"{successes} of {tried} starts exact"
+        return status, f"{successes} of {starts.tried} starts exact"
 
     def _starts(self, run: Run, x0: Array | None, rng: Generator) -> list[Array]:
         """Lattice points by peak wheel rate, then x0 or the middle of the bounds, then random points."""
@@ -134,7 +136,8 @@ class _Program:
             "ipopt.bound_relax_factor": 0.0, "error_on_fail": False,
         }
         if run.budget.seconds is not None:
-            settings["ipopt.max_wall_time"] = run.budget.seconds
+            clock = "ipopt.max_wall_time" if run.budget.clock == "wall" else "ipopt.max_cpu_time"
+            settings[clock] = run.budget.seconds
         nlp = {"x": z, "f": ca.MX(problem.cost), "g": constraints, "p": p}
         return cls(run, objective, ca.nlpsol("trajopt", "ipopt", nlp, settings), len(slacks),
                    problem.lower, problem.upper, watch)
@@ -154,6 +157,7 @@ class _Program:
         # IPOPT's own calls beyond the one an iterate that the watch has counted: line searches.
         self.run.nfev += max(0, int(stats.get("n_call_nlp_f", 0)) - self.watch.seen)
         self.run.ngev += int(stats.get("n_call_nlp_grad_f", 0))
+        self.run.nhev += int(stats.get("n_call_nlp_hess_l", 0))
         if self.watch.stopped is not None:
             self.run.stop(self.watch.stopped)
         x = np.clip(np.asarray(solution["x"]).ravel()[:d], self.run.bounds[:, 0], self.run.bounds[:, 1])

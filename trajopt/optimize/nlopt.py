@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Starts, Status, checked_bounds, checked_x0
 
 Array = NDArray[np.float64]
 
@@ -76,6 +75,7 @@ class NLopt:
 
         if x0 is not None and self.method == "direct":  # which starts in the middle, whatever it is given
             run.evaluate(x0[None])
+        starts = Starts(run)
         rounds = 1 if self.method == "direct" else self.starts
         for index in range(rounds):
             search = package.opt(getattr(package, _ALGORITHMS[self.method]), d)
@@ -87,13 +87,17 @@ class NLopt:
             search.set_maxeval(min(run.remaining() + 1, 10_000_000))
             search.set_initial_step(_STEP)
             first = np.full(d, 0.5) if x0 is None else (x0 - low) / width
-            # Why a search was stopped is in ``ended``; one that ran out of digits is just over.
-            with suppress(package.ForcedStop, package.RoundoffLimited, RuntimeError):
+            # Why a search was stopped is in ``ended``.
+            said = ""
+            try:
                 search.optimize(first if index == 0 else rng.random(d))
+            except (package.ForcedStop, package.RoundoffLimited, RuntimeError) as error:
+                said = f"{type(error).__name__}: {error}"
             if ended:
                 raise ended[0]
             run.nit += 1
-        return Status.CONVERGED, f"{rounds} starts" if rounds > 1 else "no rectangle is left to divide"
+            starts.ended(not said, said or f"NLopt's result {search.last_optimize_result()}")
+        return starts.verdict() if self.method == "bobyqa" else (starts.verdict()[0], "no rectangle is left to divide")
 
 
 def _package() -> Any:

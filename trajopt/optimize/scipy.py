@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective, ResidualObjective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Starts, Status, checked_bounds, checked_x0
 
 Array = NDArray[np.float64]
 
@@ -77,6 +77,7 @@ class ScipyLocal:
         offered = Capability.GRADIENT in run.objective.provides and self.method != "Nelder-Mead"
         low, high = run.bounds.T
         options: dict[str, Any] = {"maxiter": 10_000}
+        starts = Starts(run)
 
         def gradient(x: Array) -> Array:
             run.ngev += 1
@@ -94,7 +95,8 @@ class ScipyLocal:
                     jac=gradient if offered else None, options=options,
                     **({"constraints": [constraints]} if run.objective.constrained else {}))
             run.nit += int(result.nit)
-        return Status.CONVERGED, f"{self.starts} starts"
+            starts.ended(_flagged(result) is Status.CONVERGED, str(result.message))
+        return starts.verdict()
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ class DifferentialEvolution:
             point.cost if constrained else costs, optimize.Bounds(*run.bounds.T), x0=x0, rng=rng,
             popsize=self.population, tol=self.tolerance, maxiter=1_000_000, polish=not constrained, **extra)
         run.nit = int(result.nit)
-        return Status.CONVERGED, str(result.message)
+        return _flagged(result), str(result.message)
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,7 @@ class DualAnnealing:
         result = optimize.dual_annealing(_Point(run).cost, optimize.Bounds(*run.bounds.T), x0=x0, rng=rng,
                                          maxiter=1_000_000, maxfun=1_000_000_000)
         run.nit = int(result.nit)
-        return Status.CONVERGED, str(result.message[0])
+        return _flagged(result), str(result.message[0])
 
 
 @dataclass(frozen=True)
@@ -191,6 +193,7 @@ class LeastSquares:
 
         objective = cast(ResidualObjective, run.objective)
         gains, (low, high) = objective.residual_gains(), run.bounds.T
+        starts = Starts(run)
         for index in range(self.starts):
             start = rng.uniform(low, high) if index else (low + high) / 2 if x0 is None else x0
             run.evaluate(start[None])
@@ -208,7 +211,13 @@ class LeastSquares:
             run.nit += int(result.njev)
             run.evaluate(np.clip(result.x, low, high)[None])
             run.propose(result.x)
-        return Status.CONVERGED, f"{self.starts} starts"
+            starts.ended(bool(result.success), str(result.message))
+        return starts.verdict()
+
+
+def _flagged(result: Any) -> Status:
+    """SciPy's own flag as a status: its ``success`` says whether its stopping rule was met."""
+    return Status.CONVERGED if result.success else Status.STALLED
 
 
 def slsqp() -> ScipyLocal:

@@ -17,7 +17,8 @@ from trajopt.optimize.plugins import installed_optimizers, optimizers_of_file
 
 # name -> module and the class or preset function that makes it with default options
 OPTIMIZERS: dict[str, tuple[str, str]] = {
-    "pso": ("trajopt.optimize.pso", "constriction"),
+    "pso": ("trajopt.optimize.pso", "local_best"),
+    "pso-gbest": ("trajopt.optimize.pso", "constriction"),
     "pso-thesis-first": ("trajopt.optimize.pso", "thesis_first"),
     "pso-thesis-enhanced": ("trajopt.optimize.pso", "thesis_enhanced"),
     "pso-ring": ("trajopt.optimize.pso", "ring"),
