@@ -7,9 +7,9 @@ planner aims at. A worker builds each robot once: that takes as long as half a t
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -62,7 +62,20 @@ def _outcome(climb: Climb, engine: str) -> Outcome:
     step = climb.step
     robot = replace(_robot(HubSizes(minor_radius=step.minor_radius, depth=step.hub_depth, gap=step.hub_gap)),
                     torque_limit=step.torque)
-    return judge(climb, make_engine(engine).run(robot, step.scene(), climb_command(climb, robot)))
+    recording = make_engine(engine).run(robot, step.scene(), climb_command(climb, robot))
+    # judge() asks a step for its height and its robot only, and would build the robot again for each wheel.
+    return judge(replace(climb, step=cast(StepScene, _Built(step.height, robot))), recording)
+
+
+@dataclass(frozen=True)
+class _Built:
+    """A step with the robot that was built for it."""
+
+    height: float
+    built: SimRobot
+
+    def robot(self) -> SimRobot:
+        return self.built
 
 
 @lru_cache(maxsize=4)
