@@ -33,7 +33,7 @@ from trajopt.objectives.asoc_design import TERMS, AsocDesign, Model, best_width,
 from trajopt.optimize.base import Budget
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.pareto import ParetoFront, pareto_front
-from trajopt.optimize.search import OPTIMIZERS, minimize
+from trajopt.optimize.search import minimize, optimizer_names
 from trajopt.report.asoc import curve_figure, front_figure, map_figure, speed_figure, tracks_figure
 from trajopt.report.platform_picture import platform_figure
 from trajopt.report.style import in_style, save_figure
@@ -185,7 +185,7 @@ def optimizers(effort: Effort) -> ResultTable:
     rows.append(("full factorial 31^4", f"{total:.5f}", "", "923521", f"{1e3 * (time.perf_counter() - began):.0f}",
                  " ".join(f"{v:.4f}" for v in best), ""))
     budget = Budget(evaluations=25_000 if effort is FULL else 6_000)
-    for name in ("ipopt, 1 start", *OPTIMIZERS):
+    for name in ("ipopt, 1 start", *optimizer_names()):
         method = Ipopt(starts=1) if name == "ipopt, 1 start" else name
         try:
             minimize(design, design.bounds, optimizer=method, budget=Budget(evaluations=10))  # loads packages

@@ -22,7 +22,7 @@ from trajopt.objectives.terminal import TerminalObjective, terminal_objective, w
 from trajopt.optimize.base import Budget, OptimizeResult
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import lattice_points
-from trajopt.optimize.search import OPTIMIZERS, minimize, optimizer_named
+from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 from trajopt.problem import Problem, load_problem, problem_kind
 
 Array = NDArray[np.float64]
@@ -75,7 +75,7 @@ def all_optimizers(title: str, objectives: Sequence[TerminalObjective], effort: 
     """One row a problem and optimizer."""
     rows = []
     for objective in objectives:
-        for name in OPTIMIZERS:
+        for name in optimizer_names():
             if optimizer_named(name).needs - objective.provides:
                 continue
             minimize(objective, objective.bounds, optimizer=name, budget=Budget(200, 2.0))  # load and compile

@@ -12,9 +12,9 @@ from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.base import Budget, Status, best_index, better
-from trajopt.optimize.search import OPTIMIZERS, minimize, optimizer_named
+from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 
-GENERAL = [name for name in OPTIMIZERS if Capability.RESIDUALS not in optimizer_named(name).needs]
+GENERAL = [name for name in optimizer_names() if Capability.RESIDUALS not in optimizer_named(name).needs]
 BOX = np.array([[-2.0, 3.0], [-1.5, 2.5]])
 
 
@@ -26,7 +26,7 @@ def sphere_batch(x):
     return np.sum((x - 0.3) ** 2, axis=-1)
 
 
-@pytest.mark.parametrize("name", OPTIMIZERS)
+@pytest.mark.parametrize("name", optimizer_names())
 def test_solves_the_terminal_problem(name, scenario):
     objective = terminal_objective(scenario)
     result = minimize(objective, objective.bounds, optimizer=name, seed=1, budget=Budget(evaluations=8000))
@@ -83,7 +83,7 @@ def test_target_ends_the_search(name):
     assert result.fun <= 1.0
 
 
-@pytest.mark.parametrize("name", OPTIMIZERS)
+@pytest.mark.parametrize("name", optimizer_names())
 def test_same_seed_same_bits(name):
     problem = smdw_problem("scenario_2_lateral").replace(actuator={"enabled": True})
     objective = terminal_objective(problem)

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import trajopt
 from tests.report.conftest import problem_file
 from trajopt.errors import ArgumentError, MissingDependencyError, ProblemError
-from trajopt.optimize.search import OPTIMIZERS
+from trajopt.optimize.search import optimizer_names
 from trajopt.pipeline import Solution
 from trajopt.problem import WHEELS
 from trajopt.report.files import as_toml, finite
@@ -79,7 +79,7 @@ def test_a_summary_is_the_same_after_reading_back(solution: Solution, tmp_path: 
     assert finite(solution_summary(back, seed=4)) == finite(solution_summary(solution, seed=4))
 
 
-@pytest.mark.parametrize("optimizer", sorted(OPTIMIZERS))
+@pytest.mark.parametrize("optimizer", sorted(optimizer_names()))
 def test_equal_seeds_give_equal_summaries(optimizer: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("trajopt.report.run_folder.commit", lambda: "somebody may commit while the test runs")
     texts = []

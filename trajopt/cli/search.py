@@ -19,7 +19,8 @@ Out = Annotated[Path | None, typer.Option("--out", help="folder for trajectory, 
 
 
 def solve(problem: ProblemFile,
-          optimizer: Annotated[str, typer.Option(help="auto or the name of an optimizer")] = "auto",
+          optimizer: Annotated[str, typer.Option(help="auto, the name of an optimizer, or file.py:name")] = "auto",
+          plugin: Annotated[Path | None, typer.Option(help="Python file with own OPTIMIZERS, known by name")] = None,
           seed: Annotated[int, typer.Option(help="seed of everything random")] = 0,
           out: Out = None,
           set_: Overrides = None,
@@ -34,6 +35,7 @@ def solve(problem: ProblemFile,
     from trajopt.report.tables import solution_table
 
     loaded = load_problem(problem, overrides(set_))
+    optimizer = _of_plugin(optimizer, plugin)
     budget = _budget(evaluations, seconds, target)
     start = None
     if x0 is not None:
@@ -93,6 +95,13 @@ def _write(solution: Solution, out: Path, seed: int, pictures: bool) -> None:
 
         save_pictures(solution, out)
     console.print(f"written to {out}")
+
+
+def _of_plugin(optimizer: str, plugin: Path | None) -> str:
+    """The optimizer's name, with the plugin file where it is that one's."""
+    from trajopt.optimize.plugins import optimizers_of_file
+
+    return f"{plugin}:{optimizer}" if plugin is not None and optimizer in optimizers_of_file(plugin) else optimizer
 
 
 def _budget(evaluations: int | None, seconds: float | None, target: float | None) -> Budget:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -112,7 +113,7 @@ class RouteObjective:
         """
         knots = np.array(self.basis.knots)
         cells = max(4, self.cells // (len(knots) - 1))
-        parts = [np.linspace(a, b, cells + 1) for a, b in zip(knots[:-1], knots[1:], strict=True)]
+        parts = [np.linspace(a, b, cells + 1) for a, b in pairwise(knots)]
         for part in parts:
             part[-1] = np.nextafter(part[-1], -np.inf)
         u = np.concatenate(parts)
@@ -156,8 +157,8 @@ class RouteObjective:
         rows = assemble(samples, self.limits, self.robot)
         shape = (len(good), points)
         rest = np.zeros(len(good))
-        sd2, failed = fastest_profiles(s, *(m.reshape(*shape, -1) for m in (rows.a, rows.b, rows.c)),
-                                       rows.sd2_max.reshape(shape), rest, rest)
+        a, b, c = (m.reshape(*shape, -1) for m in (rows.a, rows.b, rows.c))
+        sd2, failed = fastest_profiles(s, a, b, c, rows.sd2_max.reshape(shape), rest, rest)
         sd = np.sqrt(sd2)
         with np.errstate(divide="ignore", invalid="ignore"):
             total = (2 * np.diff(s, axis=1) / (sd[:, 1:] + sd[:, :-1])).sum(axis=1)

@@ -56,7 +56,8 @@ class Ipopt:
     def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
                  rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
         """Search. ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the history, and
-        the polish; ``ngev`` and ``nhev`` its gradients and Hessians. Raises ArgumentError when the objective cannot be written in symbols."""
+        the polish; ``ngev`` and ``nhev`` count its gradients and Hessians. Raises ArgumentError when the objective
+        cannot be written in symbols."""
         box = checked_bounds(bounds, objective.dimension)
         start = checked_x0(x0, box)
         run = Run(objective, box, budget, progress)

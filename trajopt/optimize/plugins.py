@@ -3,11 +3,14 @@
 An entry point in the group ``trajopt.optimizers`` names a function or class that makes an optimizer with
 default options. A file, given as ``path/to/file.py`` wherever an optimizer's name is asked, has a module-level
 ``OPTIMIZERS``: a mapping of names to such functions or classes (``file.py:name`` picks one of several).
+Files named in the environment variable ``TRAJOPT_PLUGINS`` (separated as in PATH) count as installed: their
+optimizers are known by name in commands, benchmarks and tests that loop over all optimizers.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import os
 import sys
 from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
@@ -18,13 +21,20 @@ from typing import Any
 from trajopt.errors import ArgumentError
 
 GROUP = "trajopt.optimizers"
+FILES = "TRAJOPT_PLUGINS"  # environment variable
 
 Factory = Callable[[], Any]
 
 
 def installed_optimizers() -> dict[str, Factory]:
-    """Names and factories of the optimizers that installed packages offer."""
-    return {point.name: _Loaded(point) for point in entry_points(group=GROUP)}
+    """Names and factories of the optimizers of installed packages and of the files in TRAJOPT_PLUGINS.
+
+    Raises ArgumentError for a file that cannot be used.
+    """
+    found: dict[str, Factory] = {point.name: _Loaded(point) for point in entry_points(group=GROUP)}
+    for file in filter(None, os.environ.get(FILES, "").split(os.pathsep)):
+        found.update(mapping_of_file(file, "OPTIMIZERS"))
+    return found
 
 
 def optimizers_of_file(path: str | Path) -> dict[str, Factory]:

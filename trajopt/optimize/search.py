@@ -40,7 +40,7 @@ OPTIMIZERS: dict[str, tuple[str, str]] = {
 
 
 def optimizer_names() -> tuple[str, ...]:
-    """All optimizers: the package's own, then those of installed packages (entry points)."""
+    """All optimizers: the package's own, then those of installed packages and of files in TRAJOPT_PLUGINS."""
     return (*OPTIMIZERS, *(name for name in installed_optimizers() if name not in OPTIMIZERS))
 
 
@@ -60,7 +60,7 @@ def optimizer_named(name: str) -> Optimizer:
     else:
         offered, wanted = installed_optimizers(), name
     if wanted not in offered:
-        known = OPTIMIZERS if file == name else {}
+        known = OPTIMIZERS if file == name else ()
         raise ArgumentError("optimizer", name, "auto or one of " + ", ".join([*known, *offered]))
     return checked_optimizer(name, offered[wanted]())
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import json
 import sys
+import zlib
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.random import Generator
@@ -147,7 +149,7 @@ class Swarm:
             kind = getattr(np.random, state["rng"]["bit_generator"])()
             kind.state = _restored(state["rng"])
             rules = SwarmRules(**state["rules"])
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, BadZipFile, zlib.error) as error:
             raise ArgumentError("path", str(path), f"a file written by Swarm.save ({error})") from None
         bounds, x, v, own, cost, violation = arrays
         return cls(rules, bounds, Generator(kind), x, v, own, cost, violation, state["iteration"], state["idle"])

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import csv
 import os
+import zlib
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -254,7 +256,7 @@ def _search(summary: dict[str, Any], place: FilePath, names: tuple[str, ...]) ->
     try:
         with np.load(place / "explored.npz") as stored:
             samples = stored["samples"]
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error) as error:
         raise ArgumentError(str(place / "explored.npz"), str(error), "the file that solve --out writes") from None
     history = History(table["evaluations"].astype(np.int64), table["seconds_s"], table["cost"], table["violation"],
                       samples)

@@ -33,7 +33,8 @@ from trajopt.study.sweeps import sweep
 Array = NDArray[np.float64]
 
 TARGETS = tuple(10.0 ** -k for k in range(1, 10))  # shares of reference - best still left; Moré and Wild's tau
-_KEYS = {"title", "problems", "optimizers", "seeds", "evaluations", "seconds", "longer", "time_limit", "problem_root", "plugins"}
+_KEYS = {"title", "problems", "optimizers", "seeds", "evaluations", "seconds", "longer", "time_limit", "problem_root",
+         "plugins"}
 _SEEDS_IN_A_ROW = 5  # chosen
 _WARM = Budget(evaluations=60)  # a first search that loads and compiles, timed apart; chosen
 

@@ -59,7 +59,8 @@ def objective_named(name: str, plugins: tuple[str, ...] = (), root: str = "probl
     family, _, rest = name.partition("/")
     makers: dict[str, Callable[[str], tuple[Objective, Array]]] = {
         "smdw": lambda text: _smdw(text, root), "random-smdw": lambda text: _random_smdw(text, root),
-        "corridor": _corridor, "powerbot": lambda text: _powerbot(text, root), "asoc": _asoc, "classical": _classical, "more-wild": _more_wild}
+        "corridor": _corridor, "powerbot": lambda text: _powerbot(text, root), "asoc": _asoc,
+        "classical": _classical, "more-wild": _more_wild}
     for file in plugins:
         offered = mapping_of_file(file, "PROBLEMS")
         if name in offered:
