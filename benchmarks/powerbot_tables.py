@@ -14,15 +14,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.common import PROBLEMS, ROOT, ResultTable, publish
+from benchmarks.common import OUT, PROBLEMS, ROOT, ResultTable, publish
 from trajopt.control.commands import sample_time_study
-from trajopt.control.encounter import Course, Obstacle, course, safe_speed
-from trajopt.control.replan import Run, Sensor, halving_plan, replan, run_encounter
+from trajopt.control.encounter import Visitor, course, safe_speed, visited_world
+from trajopt.control.replan import TIME_STEP, Run, Sensor, halving_plan, replan, run_encounter
 from trajopt.control.tracking import Tracker
 from trajopt.errors import TrajoptError
 from trajopt.limits.limit import Limit
 from trajopt.limits.slip import Slip
-from trajopt.limits.speed import Speed
 from trajopt.limits.thesis_004 import thesis_slip_acceleration, thesis_tip_acceleration
 from trajopt.path_problem import PathProblem, load_path_problem
 from trajopt.refine import limit_jerk
@@ -34,6 +33,7 @@ from trajopt.robots.powerbot import (
     COG_TO_CASTER_AXLE,
     COG_TO_DRIVE_AXLE,
     FRICTION,
+    LARGEST_SPEED,
     REACTION_TIME,
     SCAN_TIME,
     SONAR_RANGE,
@@ -49,6 +49,14 @@ TIMED = (1, 2, 4, 5)  # experiments that the thesis scales linearly
 SLOPES = (0.0, 5.99, -5.99)  # deg; Experiment 4's ramp
 CORRIDOR = 0.5  # m to either side of a knot, chosen: inside a hallway
 RESERVE = 0.7  # share of the friction that a plan for closed-loop driving uses; chosen
+BENDS, BRAKES = 0.5, 0.8  # shares of the friction for Experiment 3's plan and for its brakes; chosen
+DISC = 0.15  # m, radius of an obstacle; chosen
+SLOW, WALK = 0.1, 0.8  # m/s, obstacles on tracks; chosen: what the sonar's delay still allows, and a walking pace
+LASER = Sensor(2.5, 0.1, 0.1, unseen_speed=WALK)  # m, s, s; chosen: a modest laser range finder
+START_ERROR = (0.0, 0.02, math.radians(1.0))  # m, m, rad; chosen
+SETTLE = Tracker().settle  # s behind the arrival
+OFF_AFTER = round(5.0 / TIME_STEP)  # samples until a start error has gone
+FIGURES = OUT / "powerbot_tables"
 PACKAGES = ("numpy", "toppra", "numba", "casadi", "pybullet")
 
 
@@ -173,12 +181,13 @@ def encounter_three() -> ResultTable:
     task = problem(3)
     rows = []
     plans = {"linear": timed(task, "thesis", "linear"), "optimal": timed(task, "physical")}
+    visitors = visits(task)["stand in the way, then are gone"][1]
     for name, plan in plans.items():
         where = course(plan, task.platform)
         sensor = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME)
         free = run_encounter(where, sensor, lambda *_: [], longest=200.0)
         for rule, planner in (("stops in time", replan), ("halving (thesis)", halving_plan)):
-            run = run_encounter(where, sensor, appearing(task, where), planner=planner, longest=300.0)
+            run = run_encounter(where, sensor, visited_world(visitors, where.outline), planner=planner, longest=300.0)
             rows.append([name, rule, f"{plan.duration:.1f}", f"{free.times[-1]:.1f}", f"{run.times[-1]:.1f}",
                          f"{run.v.max():.2f}", yes(not run.hit), yes(run.kept), yes(run.arrived),
                          f"{where.length - run.s[-1]:.1e}", f"{slowest(run):.1f}"])
@@ -187,23 +196,54 @@ def encounter_three() -> ResultTable:
         "stopping distance kept", "arrived", "distance missing, m", "slowest replan, ms of CPU"), rows)
 
 
-def appearing(task: PathProblem, where: Course):  # type: ignore[no-untyped-def]
-    """A world in which the problem's obstacles appear ahead of the robot's front and vanish again."""
-    placed: dict[int, Obstacle] = {}
-    front = float(where.outline[:, 0].max())
+def visits(task: PathProblem) -> dict[str, tuple[Sensor, list[Visitor]]]:
+    """Experiment 3's obstacles, as it prints them and on tracks; the sensor knows how fast they may be."""
+    times = [(thing.appears, thing.clears_after, thing.distance) for thing in task.obstacles]
+    sonar = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME)
+    slow = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME, unseen_speed=SLOW)
+    edge = -float(np.asarray(task.platform.footprint)[:, 1].min()) + DISC  # m, centre of a disc that leaves the lane
+    return {
+        "stand in the way, then are gone": (sonar, [Visitor(a, c, d, radius=DISC) for a, c, d in times]),
+        f"leave the lane at {SLOW:g} m/s": (slow, [Visitor(a, 10.0, d, edge - SLOW * c, SLOW, DISC)
+                                                  for a, c, d in times]),
+        f"cross at {WALK:g} m/s (laser)": (LASER, [Visitor(a - 3.0, 8.0, 2.0, -2.9, WALK, DISC) for a, _, d in times]),
+    }
 
-    def world(now: float, pose: np.ndarray) -> list[Obstacle]:
-        found = []
-        for i, thing in enumerate(task.obstacles):
-            if thing.appears <= now < thing.appears + thing.clears_after:
-                if i not in placed:
-                    ahead = front + thing.distance + 0.15
-                    placed[i] = Obstacle((pose[0] + ahead * math.cos(pose[2]), pose[1] + ahead * math.sin(pose[2])),
-                                         0.15)
-                found.append(placed[i])
-        return found
 
-    return world
+def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
+    """Experiment 3 in pybullet, closed loop, its obstacles as solid discs; names of the pictures."""
+    from trajopt.report.powerbot import draw_replan
+    from trajopt.simulate.differential import Floor
+    from trajopt.simulate.drive_encounter import drive_encounter
+    from trajopt.simulate.powerbot_model import powerbot_drive
+
+    task, robot = problem(3), powerbot(caster_half_track=0.0)
+    plan = time_scale(task.spline, with_friction(task, BENDS), robot=robot)
+    where = course(plan, robot, limits=with_friction(task, BRAKES))
+    rows, pictures = [], []
+    for name, (sensor, visitors) in visits(task).items():
+        free = run_encounter(where, sensor, lambda *_: [], longest=200.0)
+        seen = drive_encounter(where, powerbot_drive(robot), Floor(task.friction), sensor,
+                               visited_world(visitors, where.outline), longest=300.0, start_error=START_ERROR)
+        run = seen.run
+        stands = float(np.sum((run.v == 0) & (run.s > 0) & (run.s < where.length - 1e-3))) * TIME_STEP
+        rows.append([name, f"{plan.duration:.1f}", f"{free.times[-1]:.1f}", f"{run.times[-1] - SETTLE:.1f}",
+                     f"{stands:.1f}", yes(not (seen.contact or run.hit)), yes(run.kept), f"{run.gap.min():.3f}",
+                     f"{seen.off[OFF_AFTER:].max():.4f}", f"{seen.goal_offset:.4f}",
+                     f"{math.degrees(seen.heading_error):.3f}", f"{seen.slip_ratio:.2%}", f"{slowest(run):.1f}"])
+        pictures.append(draw_replan(run, where, FIGURES / f"experiment_3_{len(rows)}.png", free=free).name)
+    return ResultTable(
+        f"Experiment 3 in physics, closed loop, {1e3 * START_ERROR[1]:.0f} mm and {math.degrees(START_ERROR[2]):.0f} "
+        "deg off at the start", (
+            "obstacles", "plan, s", "free way, s", "with obstacles, s", "standing, s", "no contact",
+            "stopping distance kept at every instant", "least gap, m", "off the plan after 5 s, m", "goal offset, m",
+            "final heading, deg", "wheel slip / speed", "slowest replan, ms of CPU"), rows), pictures
+
+
+def with_friction(task: PathProblem, share: float) -> list[Limit]:
+    """The problem's limits with the physical slip limit per wheel, at a share of the friction."""
+    kept: list[Limit] = [x for x in task.as_limits(variant="physical") if x.name not in ("slip", "tip")]
+    return [*kept, Slip(share * FRICTION, per_wheel=True)]
 
 
 def safe_speeds() -> ResultTable:
@@ -231,6 +271,31 @@ def following() -> ResultTable:
         "manner", "time, s", "speed error over the path, m/s", "largest", "least margin"), rows)
 
 
+def following_in_physics() -> ResultTable:
+    """Experiment 6 in pybullet along its profile."""
+    from trajopt.simulate.differential import Floor, drive_in_pybullet
+    from trajopt.simulate.powerbot_model import powerbot_drive
+
+    task, robot = problem(6), powerbot(caster_half_track=0.0)
+    profile = task.speed_profile()
+    assert profile is not None
+    rows = []
+    for manner in ("below", "least_squares"):
+        plan = follow(task.spline, profile, with_friction(task, RESERVE), robot=robot,
+                      manner="below" if manner == "below" else "least_squares")
+        for loop, tracker in (("open", None), ("closed", Tracker())):
+            seen = drive_in_pybullet(plan.trajectory, powerbot_drive(robot), Floor(task.friction), tracker=tracker)
+            moving = seen.times <= plan.trajectory.duration
+            along = np.hypot(*(seen.pose - seen.pose[0])[:, :2].T)
+            off = (seen.speed - np.interp(along, profile.places, profile.speeds))[moving]
+            rows.append([manner, loop, f"{plan.trajectory.duration:.2f}", f"{plan.error:.4f}",
+                         f"{seen.speed_error:.4f}", f"{np.sqrt(np.mean(off**2)):.4f}", f"{seen.goal_offset:.4f}",
+                         f"{math.degrees(seen.final_heading_error):.3f}", f"{seen.slip_ratio:.2%}"])
+    return ResultTable("Experiment 6 in physics (measured on the robot: speed error 0.043 m/s, goal offset 0.928 m)", (
+        "manner", "loop", "time, s", "plan from profile, m/s", "speed from plan, m/s", "speed from profile, m/s",
+        "goal offset, m", "final heading, deg", "wheel slip / speed"), rows)
+
+
 def physics(numbers: Sequence[int]) -> ResultTable:
     """Open and closed loop in pybullet beside the measured columns."""
     from trajopt.simulate.differential import Floor, drive_in_pybullet
@@ -242,11 +307,7 @@ def physics(numbers: Sequence[int]) -> ResultTable:
     rows = []
     for number in numbers:
         task = problem(number)
-        limits: list[Limit] = [x for x in task.as_limits(variant="physical") if x.name not in ("slip", "tip")]
-        limits.append(Slip(RESERVE * FRICTION, per_wheel=True))
-        if number == 6:
-            limits.append(Speed(1.0, name="profile_top"))
-        plan = time_scale(task.spline, limits, robot=robot, terrain=task.terrain)
+        plan = time_scale(task.spline, with_friction(task, RESERVE), robot=robot, terrain=task.terrain)
         floor = Floor(task.friction, tuple(r.ramp for r in task.ramps))
         theirs = [m for m in measured if int(m["experiment"]) == number]
         for loop, tracker in (("open", None), ("closed", Tracker())):
@@ -260,6 +321,22 @@ def physics(numbers: Sequence[int]) -> ResultTable:
         "experiment", "loop", "time, s", "speed error, m/s", "heading error, deg", "goal offset, m",
         "final heading, deg", "wheel slip / speed", "measured speed error", "measured heading error",
         "measured goal offset"), rows)
+
+
+def draw_plans() -> list[str]:
+    """Pictures of the plans and of the safe speed; their names."""
+    from trajopt.report.powerbot import draw_path, draw_profiles, draw_safe_speed
+
+    made = []
+    for number in TIMED:
+        task = problem(number)
+        plans = [("linear", timed(task, "thesis", "linear")), ("optimal, thesis's limits", timed(task, "thesis")),
+                 ("optimal, physical limits", timed(task, "physical"))]
+        made += [draw_path(plans[2][1], FIGURES / f"path_{number}.png", knots=task.path.knots),
+                 draw_profiles(plans, FIGURES / f"profiles_{number}.png")]
+    made.append(draw_safe_speed(FIGURES / "safe_speed.png", braking=slip_range(math.radians(-5.99))[1],
+                                robot_speed=LARGEST_SPEED))
+    return [file.name for file in made]
 
 
 def slowest(run: Run) -> float:
@@ -288,9 +365,12 @@ def main() -> None:
     quick = parser.parse_args().quick
     tables = [printed_linear(), braking_limits(), minimum_times(), sample_times(), encounter_three(), safe_speeds(),
               following()]
+    notes = list(NOTES)
     if not quick:
-        tables += [refinements(TIMED), physics((*TIMED, 6))]
-    publish("powerbot_tables", tables, packages=PACKAGES, notes=NOTES)
+        encounter, pictures = encounter_three_in_physics()
+        tables += [refinements(TIMED), physics(TIMED), encounter, following_in_physics()]
+        notes += [f"![{name}](powerbot_tables/{name})" for name in (*pictures, *draw_plans())]
+    publish("powerbot_tables", tables, packages=PACKAGES, notes=notes)
 
 
 if __name__ == "__main__":

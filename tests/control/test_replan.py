@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajopt.control.encounter import Course, Obstacle, clearance, course, safe_speed
+from trajopt.control.encounter import Course, Obstacle, Visitor, clearance, course, safe_speed, visited_world
 from trajopt.control.replan import (
+    TIME_STEP,
     Sensor,
+    SpeedPlan,
     at_rest,
     halving_plan,
     replan,
@@ -169,3 +171,47 @@ def test_clearance_of_a_rectangle() -> None:
     pose = np.array([[0.0, 0.0, np.pi / 2]] * 3)
     centres = np.array([[0.0, 3.0], [2.0, 0.0], [0.0, 0.0]])
     assert clearance(pose, outline, centres, np.full(3, 0.25)) == pytest.approx([1.75, 1.25, -0.75])
+
+
+def test_a_visitor_walks_its_track_where_the_robot_was() -> None:
+    outline = np.array([[1.0, 0.5], [-1.0, 0.5], [-1.0, -0.5], [1.0, -0.5]])
+    world = visited_world([Visitor(2.0, 3.0, 0.6, aside=-0.4, speed=0.2, radius=0.1)], outline)
+    pose = np.array([3.0, 4.0, np.pi / 2])
+    assert world(1.9, pose) == []
+    (first,) = world(2.0, pose)
+    assert first.centre == pytest.approx((3.4, 4.0 + 1.0 + 0.6 + 0.1))
+    assert first.deviation == pytest.approx(0.2)
+    assert clearance(pose[None], outline, np.array([first.centre]), np.array([0.1])) == pytest.approx([0.6])
+    (later,) = world(4.5, np.zeros(3))  # where the robot has gone since does not matter
+    assert later.centre == pytest.approx((3.4 - 0.5, 5.7))
+    assert world(5.0, pose) == []
+
+
+def test_a_body_beside_its_plan_needs_the_allowance(bend: Course) -> None:
+    """A robot that runs 4 cm beside the plan, towards the obstacle, is safe with the allowance for it."""
+    def beside(plan: SpeedPlan, now: float, _: object) -> np.ndarray:
+        x, y, yaw = bend.poses(plan.sampled(now + TIME_STEP, 1)[0])[0]
+        return np.array([x - 0.04 * np.sin(yaw), y + 0.04 * np.cos(yaw), yaw])
+
+    block = Obstacle((1.0, 0.71), 0.1)
+    outcomes = []
+    for allowance in (0.0, 0.05):
+        run = run_encounter(bend, Sensor(2.0, 0.1, 0.1), lambda t, _: [block] if t < 6 else [], longest=60.0,
+                            body=beside, allowance=allowance)
+        outcomes.append((run.hit, run.kept))
+        assert run.arrived
+    assert outcomes[1] == (False, True)
+    assert not outcomes[0][1]
+    with pytest.raises(ArgumentError, match="allowance"):
+        run_encounter(bend, Sensor(2.0, 0.1, 0.1), lambda *_: [], longest=1.0, allowance=2.0)
+
+
+def test_a_course_brakes_with_the_limits_it_is_given() -> None:
+    """A plan that uses all the friction in a bend leaves no braking; one timed with less does."""
+    path = Path.through([[0, 0], [2, 0], [2.6, 0.6], [2.6, 2.5]])
+    robot = powerbot()
+    limits = [[Speed(2.1), Acceleration(0.55, 7.8), Slip(share * 0.332)] for share in (0.6, 1.0)]
+    fast, slow = (time_scale(path, used, robot=robot) for used in reversed(limits))
+    assert course(slow, robot, limits=limits[1]).braking.min() > 0.5
+    with pytest.raises(ArgumentError, match="brake everywhere"):
+        course(fast, robot, limits=limits[0])

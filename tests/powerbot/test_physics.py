@@ -3,25 +3,34 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path as FilePath
+from typing import Literal
 
 import numpy as np
 import pytest
 
 pytest.importorskip("pybullet")
 
+from trajopt.control.encounter import Visitor, course, visited_world
+from trajopt.control.replan import Sensor, replan
 from trajopt.control.tracking import Tracker
 from trajopt.limits.acceleration import Acceleration
+from trajopt.limits.limit import Limit
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip
+from trajopt.path_problem import PathProblem, load_path_problem
 from trajopt.paths.path import Path
+from trajopt.refine_profile import follow
 from trajopt.robots.powerbot import powerbot
 from trajopt.simulate.differential import Floor, Wall, drive_in_pybullet
+from trajopt.simulate.drive_encounter import DrivenEncounter, drive_encounter
 from trajopt.simulate.powerbot_model import powerbot_drive
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import Ramp, lay_over
 
+ROOT = FilePath(__file__).resolve().parents[2]
 ROBOT = powerbot(caster_half_track=0.0)  # balancing casters: one point of support behind
 MOTORS = (Speed(2.1), Acceleration(0.55, 7.8))
 
@@ -90,3 +99,81 @@ def test_closed_loop_through_a_door() -> None:
     crash = drive_in_pybullet(plan, powerbot_drive(ROBOT), Floor(0.332, (), walls),
                               start_error=(0.0, 0.3, 0.0))
     assert crash.touched
+
+
+def problem(number: int) -> PathProblem:
+    return load_path_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
+
+
+def with_friction(task: PathProblem, share: float) -> list[Limit]:
+    kept = [x for x in task.as_limits(variant="physical") if x.name not in ("slip", "tip")]
+    return [*kept, Slip(share * task.friction, per_wheel=True)]
+
+
+def assert_safe_and_at_the_goal(seen: DrivenEncounter) -> None:
+    run = seen.run
+    assert run.arrived
+    assert not run.hit
+    assert not seen.contact
+    assert run.kept  # the stopping distance, at every instant
+    assert run.gap.min() > 0
+    assert seen.off[200:].max() < 0.02  # m, once the start error has gone: inside the planner's allowance
+    assert seen.goal_offset < 0.02
+    assert math.degrees(seen.heading_error) < 1.0
+    assert seen.slip_ratio < 0.02
+
+
+def test_a_disc_that_crosses_is_let_by() -> None:
+    """In the way of a robot that would be there at the same time; the same disc in front of a blind robot is hit."""
+    path = Path.through([[0, 0], [3, 0]])
+    limits = [Speed(0.5), Acceleration(0.55, 1.5), Slip(0.8 * 0.332, per_wheel=True)]
+    where = course(time_scale(path, limits, robot=ROBOT), ROBOT)
+    visitor = Visitor(appears=1.0, stays=6.0, distance=1.6, aside=-1.6, speed=0.5)
+    drive = powerbot_drive(ROBOT)
+    seen = drive_encounter(where, drive, Floor(0.332), Sensor(1.4, 0.1, 0.1, unseen_speed=0.5),
+                           visited_world([visitor], where.outline), longest=20.0,
+                           start_error=(0.0, 0.02, math.radians(1.0)))
+    assert_safe_and_at_the_goal(seen)
+    blind = drive_encounter(where, drive, Floor(0.332), Sensor(1.4, 0.1, 0.1), longest=5.0,
+                            world=visited_world([visitor], where.outline), planner=lambda w, s, plan, now, _: (
+                                replan(w, s, plan, now, [])))
+    assert blind.contact
+    assert not blind.run.kept
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["stand", "leave", "cross"])
+def test_experiment_3_among_its_obstacles(kind: str) -> None:
+    """Both obstacles at the printed times: as printed, leaving the lane on a track, crossing at a walking pace."""
+    task = problem(3)
+    assert [(o.appears, o.clears_after) for o in task.obstacles] == [(9.95, 0.59), (21.2, 2.74)]
+    where = course(time_scale(task.spline, with_friction(task, 0.5), robot=ROBOT), ROBOT,
+                   limits=with_friction(task, 0.8))
+    sensor = {"stand": Sensor(0.6, 0.5, 0.5), "leave": Sensor(0.6, 0.5, 0.5, unseen_speed=0.1),
+              "cross": Sensor(2.5, 0.1, 0.1, unseen_speed=0.8)}[kind]
+    visitors = {
+        "stand": [Visitor(o.appears, o.clears_after, o.distance) for o in task.obstacles],
+        "leave": [Visitor(o.appears, 10.0, o.distance, 0.49 - 0.1 * o.clears_after, 0.1) for o in task.obstacles],
+        "cross": [Visitor(o.appears - 3.0, 8.0, 2.0, -2.9, 0.8) for o in task.obstacles]}[kind]
+    seen = drive_encounter(where, powerbot_drive(ROBOT), Floor(task.friction), sensor,
+                           visited_world(visitors, where.outline), longest=200.0,
+                           start_error=(0.0, 0.02, math.radians(1.0)))
+    assert_safe_and_at_the_goal(seen)
+    near = np.isfinite(seen.run.gap)
+    assert near.any()
+    assert np.count_nonzero(np.diff(near.astype(int)) == 1) == 2  # both came
+    assert not near[-1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("manner", ["below", "least_squares"])
+def test_experiment_6_along_its_profile(manner: Literal["below", "least_squares"]) -> None:
+    task = problem(6)
+    profile = task.speed_profile()
+    assert profile is not None
+    plan = follow(task.spline, profile, with_friction(task, 0.7), robot=ROBOT, manner=manner)
+    seen = drive_in_pybullet(plan.trajectory, powerbot_drive(ROBOT), Floor(task.friction), tracker=Tracker())
+    assert seen.goal_offset < 0.02
+    assert math.degrees(seen.final_heading_error) < 1.0
+    assert seen.speed_error < 0.043  # m/s, what thesis 004 measured on the robot (Table 18)
+    assert seen.slip_ratio < 0.02

@@ -6,13 +6,14 @@ fastest corner travels, how fast the plan goes there, how hard the robot can bra
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
-from trajopt.limits.limit import Rows
+from trajopt.limits.limit import Limit, Rows
 from trajopt.paths.samples import sample_path
 from trajopt.robots.platform import Platform
 from trajopt.timing.trajectory import Trajectory
@@ -41,6 +42,61 @@ class Obstacle:
         for name in ("radius", "deviation"):
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ArgumentError(f"obstacle.{name}", getattr(self, name), "a finite value >= 0")
+
+
+World = Callable[[float, Array], Sequence[Obstacle]]  # the true obstacles at time t (s), robot at pose (3,)
+
+
+@dataclass(frozen=True)
+class Visitor:
+    """A disc that comes in the robot's way once. Lengths m, times s, speed m/s.
+
+    At time ``appears`` its nearest point is ``distance`` ahead of the outline's front and its centre ``aside``
+    to the left of the robot's middle; it then walks across at ``speed`` (to the left > 0) on a straight track
+    and is gone after ``stays``.
+    """
+
+    appears: float
+    stays: float
+    distance: float
+    aside: float = 0.0
+    speed: float = 0.0
+    radius: float = 0.15
+
+    def __post_init__(self) -> None:
+        for name in ("appears", "stays", "distance", "radius"):
+            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise ArgumentError(f"visitor.{name}", getattr(self, name), "a finite value >= 0")
+        for name in ("aside", "speed"):
+            if not np.isfinite(getattr(self, name)):
+                raise ArgumentError(f"visitor.{name}", getattr(self, name), "a finite value")
+
+
+def visited_world(visitors: Sequence[Visitor], outline: Array, *, speed_bound: float | None = None) -> World:
+    """The world of ``visitors``, for one run: where each comes is told by the robot's pose when it appears.
+
+    ``outline`` (K, 2), m, body frame. An obstacle may move by at most ``speed_bound`` (m/s) for all the robot
+    knows; None: by its own speed.
+    """
+    front = float(np.asarray(outline)[:, 0].max())
+    placed: dict[int, tuple[Array, Array]] = {}
+
+    def world(now: float, pose: Array) -> list[Obstacle]:
+        found = []
+        for i, visitor in enumerate(visitors):
+            since = now - visitor.appears
+            if not 0.0 <= since < visitor.stays:
+                continue
+            if i not in placed:
+                ahead, left = (np.array([np.cos(pose[2] + turn), np.sin(pose[2] + turn)]) for turn in (0, np.pi / 2))
+                placed[i] = (pose[:2] + (front + visitor.distance + visitor.radius) * ahead + visitor.aside * left,
+                             visitor.speed * left)
+            centre = placed[i][0] + since * placed[i][1]
+            bound = abs(visitor.speed) if speed_bound is None else speed_bound
+            found.append(Obstacle((float(centre[0]), float(centre[1])), visitor.radius, (0.0, 0.0), bound))
+        return found
+
+    return world
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +133,19 @@ class Course:
         return np.interp(s, self.s, self.travel)
 
 
-def course(trajectory: Trajectory, robot: Platform) -> Course:
+def course(trajectory: Trajectory, robot: Platform, *, limits: Sequence[Limit] | None = None) -> Course:
     """Tables for replanning along ``trajectory``; ``robot`` gives the outline.
 
-    Raises ArgumentError where the robot cannot brake at all at some speed up to the plan's (braking rows at
-    s'' < 0 leave nothing): then no replanner can promise a stop.
+    ``limits`` say how hard the replanner may brake and accelerate; None: those of the plan. A plan that uses all
+    the friction in a bend leaves nothing to brake with: time it with less than what is allowed here. Raises
+    ArgumentError where the robot cannot brake at all at some speed up to the plan's (braking rows at s'' < 0 leave
+    nothing): then no replanner can promise a stop.
     """
     count = max(int(np.ceil(trajectory.path.length / _SPACING)) + 1, 3)
     s = np.linspace(0.0, trajectory.path.length, count)
     samples = sample_path(trajectory.path, s)
     square = np.interp(s, trajectory.s, trajectory.sd**2)
-    rows = [limit.rows(samples, trajectory.robot) for limit in trajectory.limits]
+    rows = [limit.rows(samples, trajectory.robot) for limit in (trajectory.limits if limits is None else limits)]
     highest, lowest = _acceleration_range(rows, square)
     if not lowest.max() < 0:
         place = float(s[int(np.argmax(lowest))])

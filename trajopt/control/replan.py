@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajopt.control.encounter import Course, Obstacle, clearance
+from trajopt.control.encounter import Course, Obstacle, World, clearance
 from trajopt.errors import ArgumentError
 
 Array = NDArray[np.float64]
@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 TIME_STEP = 0.02  # s between samples of a plan; chosen
 _LEVELS = 9  # accelerations tried a cycle, from full braking to full acceleration; chosen
 _CREEP = 0.05  # m/s; the halving rule stops below it; chosen
+_STILL = 0.02  # m/s, chosen: a real robot below it counts as standing (contacts give way by less)
 _PLACE = 1e-6  # m; nearer than this to the end counts as arrived
 
 
@@ -171,13 +172,16 @@ def _accepted(where: Course, sensor: Sensor, s: Array, v: Array, seen: Sequence[
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What an encounter was like, every TIME_STEP. ``gap`` (m) is the distance to the nearest obstacle there
-    was (inf without one), ``hit`` whether it closed while the robot moved, ``kept`` whether every plan passed
-    its own check, ``slowest_replan`` the longest planning time, s of processor time."""
+    """What an encounter was like, every TIME_STEP. ``pose`` (N, 3) is where the robot was and ``s``, ``v`` what
+    the plan asked for; ``gap`` (m) is the distance to the nearest obstacle there was (inf without one), ``hit``
+    whether it closed while the robot moved; ``kept`` whether every plan passed its own check and, at every
+    instant, the rest of the plan from where the robot really was came to rest clear of all that any obstacle
+    could do by then; ``slowest_replan`` the longest planning time, s of processor time."""
 
     times: Array
     s: Array
     v: Array
+    pose: Array
     gap: Array
     hit: bool
     kept: bool
@@ -186,56 +190,97 @@ class Run:
 
 
 Planner = Callable[[Course, Sensor, SpeedPlan, float, Sequence[Obstacle]], SpeedPlan]
-World = Callable[[float, Array], Sequence[Obstacle]]
+Body = Callable[[SpeedPlan, float, Sequence[Obstacle]], Array]
 
 
 def run_encounter(where: Course, sensor: Sensor, world: World, *, planner: Planner = replan, longest: float,
-                  knows_velocity: bool = False) -> Run:
+                  knows_velocity: bool = False, body: Body | None = None, allowance: float = 0.0,
+                  settle: float = 0.0) -> Run:
     """Drive ``where`` among the obstacles of ``world(time, pose)`` until arrival, or for ``longest`` seconds.
 
     ``world`` gives the true obstacles; each may move at most its deviation + |velocity|. The robot sees those
     within reach at every scan, and with ``knows_velocity`` also their velocity; without it the whole speed
-    becomes deviation. Raises ArgumentError for a ``longest`` that is not positive.
+    becomes deviation. ``body(plan, now, obstacles)`` moves the real robot one TIME_STEP on and returns its pose
+    (3,); None: it follows exactly. The planner keeps ``allowance`` (m) for how far it strays from the plan;
+    ``settle`` (s) is how long it is still driven after the plan has arrived. Raises ArgumentError for a
+    ``longest`` that is not positive, or an allowance that leaves nothing of the reach.
     """
     if not longest > 0:
         raise ArgumentError("longest", longest, "a time > 0 s")
-    plan, slowest, kept = at_rest(0.0), 0.0, True
+    if not 0 <= allowance < sensor.reach:
+        raise ArgumentError("allowance", allowance, f"a length in [0, {sensor.reach:g}) m, the reach")
+    planned = replace(sensor, reach=sensor.reach - allowance)
+    plan, slowest, kept, hit, settled = at_rest(0.0), 0.0, True, False, 0.0
     cycle = max(round(sensor.scan_time / TIME_STEP), 1)
-    s_list, v_list, gaps, hit = [0.0], [0.0], [np.inf], False
-    pose = where.poses(np.zeros(1))
-    things = world(0.0, pose[0])
+    pose = where.poses(np.zeros(1))[0]
+    things = world(0.0, pose)
+    log = [(0.0, 0.0, pose, _gap(where, pose, things))]
     for i in range(int(np.ceil(longest / TIME_STEP))):
         now = i * TIME_STEP
         if i % cycle == 0:
-            seen = [_as_seen(o, knows_velocity) for o in things
-                    if clearance(pose, where.outline, np.array([o.centre]), np.array([o.radius]))[0] <= sensor.reach]
+            seen = [_as_seen(o, knows_velocity, allowance) for o in things
+                    if _gap(where, pose, [o]) <= sensor.reach]
             begun = time.thread_time()
-            plan = planner(where, sensor, plan, now, seen)
+            plan = planner(where, planned, plan, now, seen)
             slowest = max(slowest, time.thread_time() - begun)
-            kept = kept and stops_in_time(where, sensor, plan, seen)
+            kept = kept and stops_in_time(where, planned, plan, seen)
+        if kept:
+            known = [_as_seen(o, knows_velocity, 0.0) for o in things]
+            kept = _stops_from(where, plan, now, pose, log[-1][3], known)
         (s,), (v,) = plan.sampled(now + TIME_STEP, 1)
-        s_list.append(float(s))
-        v_list.append(float(v))
-        pose = where.poses(np.array([s]))
-        things = world(now + TIME_STEP, pose[0])
-        gaps.append(_gap(where, float(s), things))
-        hit = hit or (gaps[-1] <= 0 and v > 0)
-        if s >= where.length - _PLACE and v == 0:
+        pose = where.poses(np.array([s]))[0] if body is None else body(plan, now, things)
+        things = world(now + TIME_STEP, pose)
+        gap = _gap(where, pose, things)
+        log.append((float(s), float(v), pose, gap))
+        hit = hit or (gap <= 0 and _moved(log))
+        settled = settled + TIME_STEP if s >= where.length - _PLACE and v == 0 else 0.0
+        if settled > settle:
             break
-    times: Array = TIME_STEP * np.arange(len(s_list), dtype=np.float64)
-    return Run(times, np.array(s_list), np.array(v_list), np.array(gaps), hit, kept,
-               s_list[-1] >= where.length - 1e-3, slowest)
+    s_array, v_array, poses, gaps = (np.array(column) for column in zip(*log, strict=True))
+    times: Array = TIME_STEP * np.arange(len(log), dtype=np.float64)
+    return Run(times, s_array, v_array, poses, gaps, hit, kept, bool(s_array[-1] >= where.length - 1e-3), slowest)
 
 
-def _as_seen(thing: Obstacle, knows_velocity: bool) -> Obstacle:
+def _moved(log: list[tuple[float, float, Array, float]]) -> bool:
+    """Whether the robot moves: by plan, or by more than a creep since the sample before."""
+    return log[-1][1] > 0 or float(np.hypot(*(log[-1][2] - log[-2][2])[:2])) > _STILL * TIME_STEP
+
+
+def _stops_from(where: Course, plan: SpeedPlan, now: float, pose: Array, gap: float,
+                things: Sequence[Obstacle]) -> bool:
+    """Whether the rest of ``plan``, driven from where the robot really is, stays clear of ``things``."""
+    rest = len(plan.s) - round((now - plan.start) / TIME_STEP)
+    s, v = plan.sampled(now, max(rest, 1))
+    moving = np.flatnonzero(v > 0)
+    if not len(moving) or not things:
+        return True
+    s = s[: int(moving[-1]) + 2]
+    t: Array = TIME_STEP * np.arange(len(s), dtype=np.float64)
+    travel = where.travelled(s)
+    fastest = max(thing.deviation + float(np.hypot(*thing.velocity)) for thing in things)
+    if gap > travel[-1] - travel[0] + fastest * t[-1]:
+        return True
+    poses = where.poses(s)
+    turn = pose[2] - poses[0, 2]  # the rest of the plan, moved to where the robot is
+    cos, sin = np.cos(turn), np.sin(turn)
+    d = poses[:, :2] - poses[0, :2]
+    real = np.column_stack([pose[0] + cos * d[:, 0] - sin * d[:, 1], pose[1] + sin * d[:, 0] + cos * d[:, 1],
+                            poses[:, 2] + turn])
+    return not any(np.any(clearance(real, where.outline,
+                                    np.asarray(thing.centre) + t[:, None] * np.asarray(thing.velocity),
+                                    thing.radius + thing.deviation * t) <= 0) for thing in things)
+
+
+def _as_seen(thing: Obstacle, knows_velocity: bool, allowance: float) -> Obstacle:
     if knows_velocity:
-        return thing
-    return Obstacle(thing.centre, thing.radius, (0.0, 0.0), thing.deviation + float(np.hypot(*thing.velocity)))
+        return replace(thing, radius=thing.radius + allowance)
+    return Obstacle(thing.centre, thing.radius + allowance, (0.0, 0.0),
+                    thing.deviation + float(np.hypot(*thing.velocity)))
 
 
-def _gap(where: Course, s: float, things: Sequence[Obstacle]) -> float:
+def _gap(where: Course, pose: Array, things: Sequence[Obstacle]) -> float:
     if not things:
         return float("inf")
-    poses = np.repeat(where.poses(np.array([s])), len(things), axis=0)
+    poses = np.repeat(pose[None], len(things), axis=0)
     return float(clearance(poses, where.outline, np.array([o.centre for o in things]),
                            np.array([o.radius for o in things])).min())

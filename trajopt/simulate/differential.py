@@ -7,7 +7,8 @@ carries the ramps of a path problem (rounded as the plan knows them) and walls.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path as FilePath
 from typing import Any
@@ -124,17 +125,35 @@ def drive_in_pybullet(trajectory: Trajectory, robot: DriveRobot, floor: Floor, *
     if not (np.isfinite(faster) and faster > 0):
         raise ArgumentError("faster", faster, "a finite factor > 0")
     options = DriveOptions() if options is None else options
+    start = trajectory.at(0.0).pose[0]
+    cos, sin = np.cos(start[2]), np.sin(start[2])
+    start += [cos * start_error[0] - sin * start_error[1], sin * start_error[0] + cos * start_error[1],
+              start_error[2]]
+    with drive_session(robot, floor, options, start) as session:
+        return _drive(session, trajectory, robot, tracker, options, faster)
+
+
+@contextmanager
+def drive_session(robot: DriveRobot, floor: Floor, options: DriveOptions, start: Array) -> Iterator[DriveSession]:
+    """A robot that has come to rest on the floor at ``start`` (3,): x, y (m), yaw (rad).
+
+    Raises MissingDependencyError without pybullet.
+    """
     bullet = load_bullet()
     client = bullet.connect(bullet.DIRECT)
     try:
-        session = _session(bullet, client, robot, floor, options, trajectory, start_error)
-        return _drive(session, trajectory, robot, tracker, options, faster)
+        session = _session(bullet, client, robot, floor, options, start)
+        for _ in range(round(_SETTLE / options.step)):
+            session.advance(0.0, 0.0)
+        yield session
     finally:
         bullet.disconnect(client)
 
 
 @dataclass(frozen=True, eq=False)
-class _Session:
+class DriveSession:
+    """A running simulation of one robot in Bullet."""
+
     bullet: Any
     client: int
     body: int
@@ -142,6 +161,22 @@ class _Session:
     walls: tuple[int, ...]
     robot: DriveRobot
     joints: tuple[int, int, int, int]
+
+    def interval(self, before: tuple[float, float], after: tuple[float, float],
+                 steps: int) -> tuple[Array, Array, bool]:
+        """One control interval: left and right wheel speed (m/s) go evenly from ``before`` to ``after``, since a
+        jump would tear the wheels loose. Largest slip (2,) of the drive wheels, m/s, mean loads (4,), N, and
+        whether a wall was met. Raises SimulationError when the numbers leave physics."""
+        slip, load, touched = np.zeros(2), np.zeros(4), False
+        for i in range(steps):
+            share = (i + 0.5) / steps
+            self.advance(*(a + share * (b - a) for a, b in zip(before, after, strict=True)))
+            now, force, met = self.contacts()
+            slip, load, touched = np.maximum(slip, now), load + force / steps, touched or met
+        pose, speed, _ = self.pose()
+        if not np.all(np.isfinite(pose)) or abs(speed) > _EXPLODED:
+            raise SimulationError(f"the robot moves at {speed:.3g} m/s: not physics any more")
+        return slip, load, touched
 
     def advance(self, left: float, right: float) -> None:
         radius = self.robot.radius
@@ -184,7 +219,7 @@ class _Session:
         return slip, load, touched
 
 
-def _drive(session: _Session, trajectory: Trajectory, robot: DriveRobot, tracker: Tracker | None,
+def _drive(session: DriveSession, trajectory: Trajectory, robot: DriveRobot, tracker: Tracker | None,
            options: DriveOptions, faster: float) -> DriveRecord:
     width = 2 * abs(robot.platform.body.contacts[0][1])
     substeps = max(round(options.control / options.step), 1)
@@ -194,31 +229,22 @@ def _drive(session: _Session, trajectory: Trajectory, robot: DriveRobot, tracker
     at = trajectory.at(np.minimum(times * faster, trajectory.duration))
     twist = at.twist * faster * (times < total)[:, None]
     planned_speed = at.twist[:, 0] * faster * (times < total)
-    for _ in range(round(_SETTLE / options.step)):
-        session.advance(0.0, 0.0)
     poses, speeds, slips, loads, pitches, touched = [], [], [], [], [], False
     slip, load, last = np.zeros(2), np.zeros(4), (0.0, 0.0)
     for k in range(count + 1):
         pose, speed, pitch = session.pose()
-        if not np.all(np.isfinite(pose)) or abs(speed) > _EXPLODED:
-            raise SimulationError(f"the robot moves at {speed:.3g} m/s: not physics any more")
         poses.append(pose)
         speeds.append(speed)
         slips.append(slip)
-        loads.append(load / substeps)
+        loads.append(load)
         pitches.append(pitch)
         if k == count:
             break
         v, w = float(twist[k + 1, 0]), float(twist[k + 1, 2])  # reached at the end of the interval
-        left, right = ((v - w * width / 2, v + w * width / 2) if tracker is None
-                       else tracker.wheel_speeds(at.pose[k], (v, w), pose, width))
-        slip, load = np.zeros(2), np.zeros(4)
-        for i in range(substeps):  # a ramp from the last command: a jump would tear the wheels loose
-            share = (i + 0.5) / substeps
-            session.advance(last[0] + share * (left - last[0]), last[1] + share * (right - last[1]))
-            now, force, met = session.contacts()
-            slip, load, touched = np.maximum(slip, now), load + force, touched or met
-        last = (left, right)
+        order = ((v - w * width / 2, v + w * width / 2) if tracker is None
+                 else tracker.wheel_speeds(at.pose[k], (v, w), pose, width))
+        slip, load, met = session.interval(last, order, substeps)
+        last, touched = order, touched or met
     pose_array = np.array(poses)
     pose_array[:, 2] = np.unwrap(pose_array[:, 2])
     return DriveRecord(times, pose_array, np.array(speeds), at.pose, planned_speed, np.array(slips), np.array(loads),
@@ -226,7 +252,7 @@ def _drive(session: _Session, trajectory: Trajectory, robot: DriveRobot, tracker
 
 
 def _session(bullet: Any, client: int, robot: DriveRobot, floor: Floor, options: DriveOptions,
-             trajectory: Trajectory, start_error: Sequence[float]) -> _Session:
+             start: Array) -> DriveSession:
     bullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
     bullet.setPhysicsEngineParameter(
         fixedTimeStep=options.step, numSolverIterations=options.iterations, contactBreakingThreshold=0.005,
@@ -237,11 +263,7 @@ def _session(bullet: Any, client: int, robot: DriveRobot, floor: Floor, options:
     walls = [_wall(bullet, client, wall) for wall in floor.walls]
     for solid in (*ground, *walls):
         bullet.changeDynamics(solid, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=client)
-    pose = trajectory.at(0.0).pose[0]
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    x = pose[0] + cos * start_error[0] - sin * start_error[1]
-    y = pose[1] + sin * start_error[0] + cos * start_error[1]
-    yaw = pose[2] + start_error[2]
+    x, y, yaw = (float(value) for value in start)
     cog = robot.chassis_cog
     z = cog[2] + sum(float(r.height_at(np.array([x]), np.array([y]))[0]) for r in floor.ramps)
     with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
@@ -263,7 +285,7 @@ def _session(bullet: Any, client: int, robot: DriveRobot, floor: Floor, options:
         if link in joints:  # equally stiff, so that the four contacts share the load as the limits assume
             bullet.changeDynamics(body, link, contactStiffness=_STIFFNESS, contactDamping=_DAMPING,
                                   physicsClientId=client)
-    return _Session(bullet, client, body, tuple(ground), tuple(walls), robot,
+    return DriveSession(bullet, client, body, tuple(ground), tuple(walls), robot,
                     (joints[0], joints[1], joints[2], joints[3]))
 
 
