@@ -39,8 +39,9 @@ NonNegative = Annotated[float, Field(ge=0)]
 Interval = tuple[float, float]
 Wheels4 = tuple[float, float, float, float]
 
-# Final wheel angles along any path obey theta1 + theta2 = theta3 + theta4 and the heading identity, so for
-# the diagonal pairs the two critical angles are not independent (thesis 000; both are fixed by one turn).
+# Final wheel angles along any path obey theta1 + theta2 = theta3 + theta4 and the heading identity: two of the
+# four are free, and for the diagonal pairs not even two (thesis 000; both are fixed by one turn).
+FREE_ANGLES = 2
 _SINGULAR_PAIRS = ({"front-left", "rear-right"}, {"front-right", "rear-left"})
 
 
@@ -66,7 +67,8 @@ class Goal(Section):
 
     pose: Pose = Field(description="x, y, yaw: m, m, rad")
     wheels: Wheels4 = Field(description="wanted wheel angles FL, FR, RL, RR, rad")
-    critical: tuple[WheelName, ...] = Field(description="wheels whose final angle counts", min_length=1)
+    critical: tuple[WheelName, ...] = Field(description="one or two wheels whose final angle counts", min_length=1,
+                                            json_schema_extra={"maxItems": FREE_ANGLES})
 
     @property
     def critical_indices(self) -> tuple[int, ...]:
@@ -77,6 +79,9 @@ class Goal(Section):
     def _independent(self) -> Self:
         if len(set(self.critical)) != len(self.critical):
             raise broken_rule("critical", list(self.critical), "each wheel once")
+        if len(self.critical) > FREE_ANGLES:
+            raise broken_rule("critical", list(self.critical), "one or two wheels: pose and two of the final angles "
+                              "fix the other two (FL + FR = RL + RR, and FR - FL + RR - RL follows from the turn)")
         if len(self.critical) == 2 and set(self.critical) in _SINGULAR_PAIRS:
             raise broken_rule("critical", list(self.critical), "two wheels that are not diagonally opposite "
                         "(diagonal wheels cannot be set independently)")
@@ -333,10 +338,11 @@ def translated(error: ValidationError, file: str, model: type[BaseModel]) -> Pro
         return ProblemError(file, key, first["input"], f"a known key; the nearest is '{near[0]}'")
     if first["type"] == "missing":
         return ProblemError(file, key, "missing", "this key to be given")
-    message = first["msg"].replace("a valid tuple", "an array of numbers").replace("valid array", "an array")
-    expected = message[0].lower() + message[1:].removeprefix("nput should be ")
-    expected = expected.removeprefix("i") if message.startswith("Input should be ") else expected
-    return ProblemError(file, key, first["input"], expected)
+    message = first["msg"].removeprefix("Input should be ").replace("a valid array", "an array")
+    message = message.replace("an object", "a table")  # what JSON calls an object
+    if first["type"] == "too_long":
+        message = f"at most {first['ctx']['max_length']} values, not {first['ctx']['actual_length']}"
+    return ProblemError(file, key, first["input"], message[0].lower() + message[1:])
 
 
 def _as_json(value: Any) -> Any:
