@@ -217,6 +217,7 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
     from trajopt.simulate.drive_encounter import drive_encounter
     from trajopt.simulate.powerbot_model import powerbot_drive
 
+    FIGURES.mkdir(parents=True, exist_ok=True)
     task, robot = problem(3), powerbot(caster_half_track=0.0)
     plan = time_scale(task.spline, with_friction(task, BENDS), robot=robot)
     where = course(plan, robot, limits=with_friction(task, BRAKES))
@@ -327,6 +328,7 @@ def draw_plans() -> list[str]:
     """Pictures of the plans and of the safe speed; their names."""
     from trajopt.report.powerbot import draw_path, draw_profiles, draw_safe_speed
 
+    FIGURES.mkdir(parents=True, exist_ok=True)
     made = []
     for number in TIMED:
         task = problem(number)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.common import ResultTable, publish
+from benchmarks.common import OUT, ResultTable, publish
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
@@ -26,6 +26,7 @@ from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
+from trajopt.report.timing import draw_growth, growth_exponent
 from trajopt.robots.platform import Body, Platform, differential_platform
 from trajopt.timing.bounds import bounds_profile
 from trajopt.timing.compiled import compiled_profile, fastest_profiles
@@ -35,6 +36,7 @@ from trajopt.timing.toppra import toppra_profile
 
 Array = NDArray[np.float64]
 
+FIGURES = OUT / "time_scaling"
 PACKAGES = ("trajopt", "numpy", "numba", "toppra", "copp-py")
 POINTS = 1001  # TARGETS: 1,001 points
 BATCH, BATCH_POINTS = 4000, 200  # TARGETS: 4,000 profiles of 200 points
@@ -48,11 +50,12 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer repetitions, at most 10,000 points")
     quick = parser.parse_args().quick
     repetitions = 20 if quick else 200
+    grown, note = growth(quick)
     tables = [with_forces(repetitions), coordinates(repetitions), batch(1 if quick else 3),
-              whole_call(3 if quick else 10), growth(quick)]
+              whole_call(3 if quick else 10), grown]
     publish("time_scaling", tables, packages=PACKAGES, notes=[
         "Ratios compare within this run. copp-py has no slip, tip or wheel rows. s'^2 differs from toppra's by "
-        "what toppra takes off on purpose at each step (1e-8)."])
+        "what toppra takes off on purpose at each step (1e-8).", note])
 
 
 def robot() -> Platform:
@@ -194,20 +197,28 @@ def whole_call(repetitions: int) -> ResultTable:
         "engine", "ms", "gridpoints after refinement", "duration s", "slow-down", "least margin"), rows)
 
 
-def growth(quick: bool) -> ResultTable:
-    rows = []
-    for points in SIZES:
-        if quick and points > 10_000:
-            break
+def growth(quick: bool) -> tuple[ResultTable, str]:
+    """Cost against the number of points, and a line for the notes with slope and picture."""
+    rows, ours, theirs = [], [], []
+    sizes = [points for points in SIZES if points <= (10_000 if quick else SIZES[-1])]
+    for points in sizes:
         stages = force_stages(points)
-        ours = best(lambda stages=stages: compiled_profile(stages, 0.0, 0.0), 3 if points > 3000 else 20)  # type: ignore[misc]
-        theirs = ""
+        seconds = best(lambda stages=stages: compiled_profile(stages, 0.0, 0.0),  # type: ignore[misc]
+                       min(200, max(10, 200_000 // points)))
+        ours.append(seconds)
         if points <= TOPPRA_UP_TO:
-            theirs = f"{best(lambda stages=stages: toppra_profile(stages, 0.0, 0.0), 2) * 1e3:.1f}"  # type: ignore[misc]
-        rows.append([str(points), f"{ours * 1e3:.3f}", f"{ours / points * 1e9:.0f}", theirs,
+            theirs.append(best(lambda stages=stages: toppra_profile(stages, 0.0, 0.0), 3))  # type: ignore[misc]
+        rows.append([str(points), f"{seconds * 1e3:.3f}", f"{seconds / points * 1e9:.0f}",
+                     f"{theirs[-1] * 1e3:.1f}" if points <= TOPPRA_UP_TO else "",
                      f"{duration(stages, compiled_profile(stages, 0.0, 0.0)):.6f}"])
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    picture = draw_growth({"compiled": (sizes, ours), "toppra": (sizes[: len(theirs)], theirs)},
+                          FIGURES / "growth.png")
+    note = (f"Cost against N from {sizes[0]} to {sizes[-1]} points: compiled ~ N^{growth_exponent(sizes, ours):.3f}, "
+            f"toppra ~ N^{growth_exponent(sizes[: len(theirs)], theirs):.3f} (least squares in log-log; 1 is linear). "
+            f"![cost against N](time_scaling/{picture.name})")
     return ResultTable("Cost against the number of points", (
-        "points", "compiled ms", "compiled ns a point", "toppra ms", "duration s"), rows)
+        "points", "compiled ms", "compiled ns a point", "toppra ms", "duration s"), rows), note
 
 
 if __name__ == "__main__":
