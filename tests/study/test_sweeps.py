@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
 import resource
 import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +23,8 @@ from tests.study.run_functions import cheap, mixed, noop, paced, poisoned
 from tests.study.same_table import swept
 from trajopt.errors import ArgumentError
 from trajopt.study.cases import Case
-from trajopt.study.drive import Progress
+from trajopt.study.drive import Progress, WorkerStartError
+from trajopt.study.engines import Engine
 from trajopt.study.host import RunLoadError
 from trajopt.study.store import StoreError, open_store
 from trajopt.study.sweeps import sweep
@@ -195,3 +200,35 @@ def test_columns_and_bad_arguments(tmp_path: Path) -> None:
         sweep(cases(1), noop, store=store, time_limit=0.0)
     with pytest.raises(ArgumentError, match="case_seed"):
         sweep([{"case_seed": 1}], noop, store=store)
+
+
+@pytest.mark.slow
+def test_workers_that_cannot_start_are_an_error_with_a_reason(tmp_path: Path) -> None:
+    """A script without a guard: its workers run it again instead of starting."""
+    script = tmp_path / "script.py"
+    script.write_text("from pathlib import Path\nfrom trajopt.study.sweeps import sweep\n"
+                      "def run(case): return 1.0\n"
+                      f"sweep([{{'x': 1}}], run, executor=1, store=Path({str(tmp_path / 'store')!r}))\n")
+    done = subprocess.run([sys.executable, str(script)], cwd=ROOT, capture_output=True, text=True, timeout=120,
+                          check=False, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    assert done.returncode == 1
+    assert "died at 6 starts in a row" in done.stderr.strip().splitlines()[-1]
+    assert 'if __name__ == "__main__"' in done.stderr.strip().splitlines()[-1]
+
+
+def test_an_engine_that_fails_a_few_starts_is_tried_again(tmp_path: Path) -> None:
+    failures = [RuntimeError("a process of the cluster was killed"), asyncio.CancelledError(), OSError("no answer")]
+
+    @contextmanager
+    def start() -> Iterator[Executor]:
+        if failures:
+            raise failures.pop()
+        with ThreadPoolExecutor(1) as executor:
+            yield executor
+
+    store = sweep(cases(10), cheap, executor=Engine("shaky", start, 1), store=tmp_path / "store")
+    assert store.counts() == {"done": 10}
+    failures += [RuntimeError("killed")] * 9
+    with pytest.raises(WorkerStartError, match="shaky: workers died at 2 starts in a row"):
+        sweep(cases(20), cheap, executor=Engine("shaky", start, 1, starts=2), store=store)
+    assert store.counts() == {"done": 10}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import time
+from asyncio import CancelledError
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
@@ -119,7 +120,7 @@ class Drive:
             self._stop(flights, mark)
             raise
         finally:
-            with contextlib.suppress(BrokenExecutor):
+            with contextlib.suppress(Exception):  # of a cluster that lost processes: all that counts is stored
                 context.__exit__(None, None, None)
             mark.unlink(missing_ok=True)
 
@@ -253,14 +254,14 @@ class Drive:
 
     def _started(self) -> tuple[AbstractContextManager[Executor], Executor]:
         """A working executor. One whose workers cannot even start is no case's fault: raises WorkerStartError."""
-        fault: Exception | None = None
-        for _ in range(RETRIES + 1):
+        fault: BaseException | None = None
+        for _ in range(self.engine.starts):
             context = self.engine.start()
             try:
                 executor = context.__enter__()
             except TrajoptError:
                 raise
-            except Exception as error:  # a cluster some of whose processes died while it started
+            except (Exception, CancelledError) as error:  # a cluster some of whose processes died while it started
                 fault = error
                 continue
             try:
@@ -275,12 +276,13 @@ class Drive:
                     context.__exit__(None, None, None)
                 if not isinstance(error, BrokenExecutor) and not _is_death(error):
                     raise
-        raise WorkerStartError(f"{self.engine.name}: workers die at their start, before any case; a script that runs "
-                               "a sweep needs `if __name__ == \"__main__\":` around what it does") from fault
+        raise WorkerStartError(f"{self.engine.name}: workers died at {self.engine.starts} starts in a row, before any "
+                               "case; finished cases are kept; a script that runs a sweep needs "
+                               "`if __name__ == \"__main__\":` around what it does") from fault
 
     def _rebuilt(self, context: AbstractContextManager[Executor],
                  rebuilds: int) -> tuple[AbstractContextManager[Executor], Executor]:
-        with contextlib.suppress(BrokenExecutor):
+        with contextlib.suppress(Exception):
             context.__exit__(None, None, None)
         if not self.engine.rebuilds or rebuilds > _MOST_REBUILDS:
             raise BrokenExecutor(f"the executor ({self.engine.name}) broke and cannot be made anew; finished cases "
