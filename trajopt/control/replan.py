@@ -22,7 +22,9 @@ from trajopt.errors import ArgumentError
 Array = NDArray[np.float64]
 
 TIME_STEP = 0.02  # s between samples of a plan; chosen
-_LEVELS = 9  # accelerations tried a cycle, from full braking to full acceleration; chosen
+# Shares of full braking (< 0) and full acceleration (> 0) tried a cycle; chosen: fine near a constant speed, so that
+# the safe speed is approached and not jumped across at every scan.
+_LEVELS = np.array([-1.0, -0.5, -0.25, -0.1, -0.03, 0.0, 0.1, 0.4, 1.0])
 _CREEP = 0.05  # m/s; the halving rule stops below it; chosen
 _STILL = 0.02  # m/s, chosen: a real robot below it counts as standing (contacts give way by less)
 _PLACE = 1e-6  # m; nearer than this to the end counts as arrived
@@ -128,12 +130,12 @@ def _choices(where: Course, s: float, v: float, cycle: int) -> list[tuple[Array,
     ahead = (where.s >= s - 0.1) & (where.s <= s + reach)
     braking = float(where.braking[ahead].min())
     forward = float(where.acceleration[ahead].min())
-    u = np.linspace(-braking, forward, _LEVELS)
-    place, speed = np.full(_LEVELS, s), np.full(_LEVELS, v)
+    u = np.where(_LEVELS < 0, braking, forward) * _LEVELS
+    place, speed = np.full(len(u), s), np.full(len(u), v)
     places, speeds = [], []
     longest = cycle + int(np.ceil(top / braking / TIME_STEP)) + 2
     for i in range(longest):
-        rate = u if i < cycle else np.full(_LEVELS, -braking)
+        rate = u if i < cycle else np.full(len(u), -braking)
         fresh = np.maximum(speed + rate * TIME_STEP, 0.0)
         beyond = place + fresh * TIME_STEP
         allowed = where.speed(beyond)  # 0 at the end of the path, so the last step is free of it
@@ -145,7 +147,7 @@ def _choices(where: Course, s: float, v: float, cycle: int) -> list[tuple[Array,
         if i >= cycle and not speed.any():
             break
     s_all, v_all = np.array(places), np.array(speeds)
-    return [(s_all[:, k], v_all[:, k]) for k in range(_LEVELS - 1, -1, -1)]
+    return [(s_all[:, k], v_all[:, k]) for k in range(len(u) - 1, -1, -1)]
 
 
 def _accepted(where: Course, sensor: Sensor, s: Array, v: Array, seen: Sequence[Obstacle]) -> bool:

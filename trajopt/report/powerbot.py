@@ -97,8 +97,8 @@ def draw_replan(run: Run, where: Course, file: str | FilePath, *, free: Run | No
         figure: Figure = new_figure(4.4)
         speed, gap = figure.subplots(2, 1, sharex=True)
         if free is not None:
-            speed.plot(free.times, free.v, color=GREY, lw=1.0, label=f"way free, {free.times[-1]:.1f} s")
-        speed.plot(run.times, run.v, color=BLUE, label=f"with obstacles, {run.times[-1]:.1f} s")
+            speed.plot(free.times, free.v, color=GREY, lw=1.0, label=f"way free, {_arrival(free):.1f} s")
+        speed.plot(run.times, run.v, color=BLUE, label=f"with obstacles, {_arrival(run):.1f} s")
         speed.set(ylabel="speed, m/s", title="Replanned motion")
         seen = np.isfinite(run.gap)
         stop = run.v**2 / (2 * np.interp(run.s, where.s, where.braking))
@@ -111,3 +111,8 @@ def draw_replan(run: Run, where: Course, file: str | FilePath, *, free: Run | No
                 axes.axvspan(run.times[first], run.times[min(end, len(run.times) - 1)], color="#f3e3d8", lw=0)
             legend_beside(axes)
         return save_figure(figure, FilePath(file))
+
+
+def _arrival(run: Run) -> float:
+    """When the plan came to its last place, s."""
+    return float(run.times[int(np.argmax(run.s >= run.s[-1]))])
