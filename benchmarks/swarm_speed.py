@@ -31,7 +31,7 @@ PACKAGES = ("trajopt", "numpy", "numba", "pyswarms", "pymoo")
 PARTICLES, ITERATIONS = 50, 500  # thesis 000, Table 5.8
 OVERHEAD = (40, 20, 500)  # particles, dimension, iterations
 EQUAL = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # Clerc and Kennedy 2002
-MINIMUM = {"numpy": 20.0, "search": 10.0, "overhead": 2.0}  # what the ratios are to reach
+MINIMUM = {"numpy": 20.0, "numpy, heading free": 20.0, "search": 10.0, "overhead": 2.0}  # what the ratios are to reach
 
 
 def best_of(function: Callable[[], Any], repeats: int) -> float:
@@ -56,9 +56,9 @@ def objective(*free: str) -> TerminalObjective:
     return terminal_objective(with_free(problem.replace(actuator={"enabled": True}), *free))
 
 
-def kernels(repeats: int) -> tuple[list[tuple[str, ...]], float]:
-    """Rows for one batch of 50 particles, and the ratio NumPy / compiled over P2."""
-    rows, ratio = [], 0.0
+def kernels(repeats: int) -> tuple[list[tuple[str, ...]], list[float]]:
+    """Rows for one batch of 50 particles, and the ratios NumPy / compiled."""
+    rows, ratios = [], []
     for free in (("p2",), ("p1", "p2"), ("p1", "p2", "heading")):
         asked = objective(*free)
         z = np.random.default_rng(0).uniform(*asked.bounds.T, size=(PARTICLES, asked.dimension))
@@ -70,8 +70,8 @@ def kernels(repeats: int) -> tuple[list[tuple[str, ...]], float]:
         error = float(np.max(np.abs(asked.evaluate(z).cost - _numpy_cost(asked, z))))
         times = (f"{seconds * 1e3:.3f}" for seconds in (readable, general, fast))
         rows.append(("+".join(free), str(asked.steps), *times, f"{readable / fast:.1f}", f"{error:.1e}"))
-        ratio = ratio or readable / fast
-    return rows, ratio
+        ratios.append(readable / fast)
+    return rows, ratios
 
 
 def _numpy_cost(asked: TerminalObjective, z: Array) -> Array:
@@ -144,7 +144,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Speed of swarm evaluation and search.")
     parser.add_argument("--quick", action="store_true", help="fewer repeats")
     repeats = 5 if parser.parse_args().quick else 60
-    kernel_rows, numpy_ratio = kernels(repeats)
+    kernel_rows, numpy_ratios = kernels(repeats)
     search_rows, search_ratio = searches(max(2, repeats // 10))
     overhead_rows, overhead_ratio = overhead(max(3, repeats // 6))
     tables = [
@@ -153,7 +153,8 @@ def main() -> None:
         ResultTable(f"Whole search, {PARTICLES} x {ITERATIONS}, s", ("search", "seconds", "ratio"), search_rows),
         ResultTable("Overhead, {} x {}-D x {}, s".format(*OVERHEAD), ("package", "seconds", "ratio"), overhead_rows),
     ]
-    ratios = {"numpy": numpy_ratio, "search": search_ratio, "overhead": overhead_ratio}
+    ratios = {"numpy": numpy_ratios[0], "numpy, heading free": numpy_ratios[-1], "search": search_ratio,
+              "overhead": overhead_ratio}
     notes = [f"{name}: {value:.1f} times, wanted {MINIMUM[name]:g}: "
              f"{'holds' if value >= MINIMUM[name] else 'FALLS SHORT'}" for name, value in ratios.items()]
     publish("swarm_speed", tables, packages=PACKAGES, notes=notes)

@@ -36,7 +36,8 @@ Plugins = Annotated[list[Path] | None, typer.Option("--plugin", help="Python fil
 
 @app.command(RUN)
 def run(bench_file: BenchFile, store: StoreOption = None, plugin: Plugins = None,
-        jobs: Annotated[int, typer.Option(help="searches at a time")] = 1) -> None:
+        jobs: Annotated[int, typer.Option(help="searches at a time")] = 1,
+        retry_failed: Annotated[bool, typer.Option(help="also run again what hung, raised or died")] = False) -> None:
     """Run every search that has no row yet; started again after any interruption, it goes on."""
     from trajopt.study.bench import load_bench, run_bench
 
@@ -53,7 +54,7 @@ def run(bench_file: BenchFile, store: StoreOption = None, plugin: Plugins = None
         def report(now: SweepProgress) -> None:
             bar.update(task, completed=now.finished, total=now.total)
 
-        found = run_bench(plan, place, jobs=jobs, progress=report)
+        found = run_bench(plan, place, jobs=jobs, retry_failed=retry_failed, progress=report)
     console.print(", ".join(f"{count} {name}" for name, count in found.counts().items()))
 
 

@@ -31,7 +31,7 @@ _SUMS = 10  # first row that is added up over the steps
 
 
 @numba.njit(inline="always", fastmath=STRICT)
-def _step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
+def step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
     """Actuator.step_mean in wheel travel: mean d, half-span h, limits as travel a step.
 
     Half-spans below ``tiny`` are widened to it, which changes nothing but exactly at a kink of the actuator.
@@ -46,7 +46,7 @@ def _step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(inline="always", fastmath=STRICT)
-def _turned(c, s, a):  # type: ignore[no-untyped-def]
+def turned(c, s, a):  # type: ignore[no-untyped-def]
     """(cos, sin) turned by the small angle a."""
     q = a * a
     sin = a * (1.0 + q * (S3 + q * (S5 + q * (S7 + q * S9))))
@@ -79,10 +79,10 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
             ey = h0 + h1 * x1 + h2 * y1 + h3 * x2 + h4 * y2
             d0, d1 = u0 + i00 * bx + i01 * by, u1 + i10 * bx + i11 * by
             d2, d3 = u2 + i20 * bx + i21 * by, u3 + i30 * bx + i31 * by
-            s0 = _step_travel(d0, v0 + i00 * ex + i01 * ey, sat, dz, tiny)
-            s1 = _step_travel(d1, v1 + i10 * ex + i11 * ey, sat, dz, tiny)
-            s2 = _step_travel(d2, v2 + i20 * ex + i21 * ey, sat, dz, tiny)
-            s3 = _step_travel(d3, v3 + i30 * ex + i31 * ey, sat, dz, tiny)
+            s0 = step_travel(d0, v0 + i00 * ex + i01 * ey, sat, dz, tiny)
+            s1 = step_travel(d1, v1 + i10 * ex + i11 * ey, sat, dz, tiny)
+            s2 = step_travel(d2, v2 + i20 * ex + i21 * ey, sat, dz, tiny)
+            s3 = step_travel(d3, v3 + i30 * ex + i31 * ey, sat, dz, tiny)
             st[_W0 + j] += s0
             st[_W1 + j] += s1
             st[_W2 + j] += s2
@@ -92,7 +92,7 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
             ly = f10 * l0 + f11 * l1 + f12 * l2 + f13 * l3
             lt = f20 * l0 + f21 * l1 + f22 * l2 + f23 * l3
             # From the last step's middle to this one's: half of either step's lost turn.
-            c, s = _turned(st[_COS + j], st[_SIN + j], 0.5 * (lt + st[_TURN + j]))
+            c, s = turned(st[_COS + j], st[_SIN + j], 0.5 * (lt + st[_TURN + j]))
             st[_COS + j], st[_SIN + j], st[_TURN + j] = c, s, lt
             st[_SUM_YAW + j] += lt
             mx = p0 + p1 * x1 + p2 * x2 + cm * lx - sm * ly
@@ -127,7 +127,7 @@ def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type: ignore[no-untyped-def]
+def terminal_costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type: ignore[no-untyped-def]
     """Table 4.4 of thesis 000 from final states ``end`` (7, n)."""
     for i in range(end.shape[1]):
         total = 0.0
@@ -162,6 +162,10 @@ class PrescribedSwarm:
     limits: Array
     start: Array  # (7,)
 
+    def fits(self, candidates: Array) -> bool:  # noqa: ARG002 - as of ``heading_swarm``
+        """Whether the kernel applies: always, the heading is prescribed."""
+        return True
+
     def predict(self, candidates: Array) -> Array:
         """(7, n): final x, y (m), yaw and wheel travel (rad) of candidates (n, d)."""
         z = np.ascontiguousarray(candidates, dtype=np.float64)
@@ -173,7 +177,8 @@ class PrescribedSwarm:
     def cost(self, candidates: Array, goal: Goal) -> Array:
         """(n,): terminal cost of candidates (n, d)."""
         cost = np.empty(len(candidates))
-        _costs(self.predict(candidates), goal.pose, goal.gains, goal.travel, goal.wheel_gains, goal.period, cost)
+        terminal_costs(self.predict(candidates), goal.pose, goal.gains, goal.travel, goal.wheel_gains, goal.period,
+                       cost)
         return cost
 
 

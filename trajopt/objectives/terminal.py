@@ -193,17 +193,19 @@ class TerminalObjective:
 
     @cached_property
     def _prescribed(self) -> Any:
-        """The compiled swarm (see ``objectives.swarm``) and what it compares with; None where it does not apply."""
-        if self.actuator.is_ideal or "heading" in self.problem.spline.free or self.model.inverse.shape != (4, 3) \
-                or swarm_engine() != "numba":
+        """The compiled swarm (``objectives.swarm``, or ``heading_swarm`` where the heading is free) and what it
+        compares with; None where it does not apply."""
+        if self.actuator.is_ideal or self.model.inverse.shape != (4, 3) or swarm_engine() != "numba":
             return None
-        from trajopt.objectives import swarm
+        from trajopt.objectives import heading_swarm, swarm
 
         points = self.control_points(self.default[:, None])
+        heading = ("p1.yaw_rad", "p2.yaw_rad") if "heading" in self.problem.spline.free else ()
         rows = [self.names.index(name) if name in self.names else -1
-                for name in ("p1.x_m", "p1.y_m", "p2.x_m", "p2.y_m", "duration_s")]
-        plan = swarm.prepared(step_grid(self.basis, self.steps), self.model, self.actuator, points.x[:, 0],
-                              points.y[:, 0], points.yaw[:, 0], float(points.duration[0, 0]), np.array(rows))
+                for name in ("p1.x_m", "p1.y_m", "p2.x_m", "p2.y_m", *heading, "duration_s")]
+        prepared = heading_swarm.prepared if heading else swarm.prepared
+        plan = prepared(step_grid(self.basis, self.steps), self.model, self.actuator, points.x[:, 0], points.y[:, 0],
+                        points.yaw[:, 0], float(points.duration[0, 0]), np.array(rows))
         section, goal = self.problem.objective, self.problem.goal
         wheel_gains = np.zeros(4)
         wheel_gains[list(goal.critical_indices)] = section.wheel_gain
@@ -217,7 +219,7 @@ class TerminalObjective:
             section = self.problem.objective
             cost = section.wheel_gain * np.abs(folded(candidates @ matrix.T + offset, section.period)).sum(axis=1)
             return Evaluation(cost, np.zeros(len(candidates)))
-        if self._prescribed is not None:
+        if self._prescribed is not None and self._prescribed[0].fits(candidates):
             plan, goal = self._prescribed
             return Evaluation(plan.cost(candidates, goal), np.zeros(len(candidates)))
         return self.evaluate_readable(candidates)

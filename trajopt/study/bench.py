@@ -204,13 +204,14 @@ def _cpu() -> str:
                 platform.processor() or platform.machine())
 
 
-def run_bench(plan: BenchPlan, store: str | Path, *, jobs: int = 1,
+def run_bench(plan: BenchPlan, store: str | Path, *, jobs: int = 1, retry_failed: bool = False,
               progress: Callable[[Progress], None] | None = None) -> Store:
-    """Run all cases that have no row in ``store`` yet, ``jobs`` at a time."""
+    """Run all cases that have no row in ``store`` yet (or only a failed one), ``jobs`` at a time."""
     seconds = (("", plan.seconds), *sorted(plan.longer.items()))
     run = BenchRun(plan.evaluations, seconds, str(Path(plan.problem_root).resolve()), plan.plugins)
     about = {"evaluations": plan.evaluations, "seconds": dict(seconds), "plugins": list(plan.plugins)}
     return sweep(plan.cases(), run, executor=jobs, store=store, time_limit=plan.time_limit, problem=about,
+                 retry_failed=retry_failed,
                  source=json.dumps({"title": plan.title, "problems": plan.problems, "optimizers": plan.optimizers}),
                  progress=progress)
 

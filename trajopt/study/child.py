@@ -71,7 +71,8 @@ def main(connection_handle: int, progress_handle: int, parent: int, memory_limit
                 rows, sent = _sent(connection, rows), now
             PROGRESS.pack_into(progress, 0, index, now)
             rows.append(_row(run, index, Case(identity, values)))
-        PROGRESS.pack_into(progress, 0, -1, 0.0)
+        # Not zero: the host may read while the next case is half written, and must see a time near its own.
+        PROGRESS.pack_into(progress, 0, -1, time.monotonic())
         _sent(connection, rows)
         connection.send(("finished",))
 

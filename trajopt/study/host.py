@@ -173,7 +173,7 @@ class _Child:
         self.connection: Connection[Any, Any] = ours
         self.output = b""
         self.shared = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
-        self.shared.write(PROGRESS.pack(-1, 0.0))
+        self.shared.write(PROGRESS.pack(-1, time.monotonic()))  # as in ``child``: never far from now
         self.shared.flush()
         self.progress = mmap.mmap(self.shared.fileno(), PROGRESS.size)
         handles = (theirs.fileno(), self.shared.fileno())

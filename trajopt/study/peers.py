@@ -21,16 +21,23 @@ from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status,
 Array = NDArray[np.float64]
 
 _LARGE = 1e100  # stands for an infeasible evaluation
+EXAMPLE = {"c1": 0.5, "c2": 0.3, "w": 0.9}  # pyswarms 1.3 documentation, "Basic Optimization"
+CONSTRICTION = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # Clerc and Kennedy 2002, as our default
 _FOREVER = 1_000_000  # iterations; the run's budget ends searches before
 
 
 @dataclass(frozen=True)
 class PySwarms:
-    """pyswarms's GlobalBestPSO. Its documentation's options, or with ``equal`` our constriction coefficients."""
+    """pyswarms's GlobalBestPSO with its documentation's options.
+
+    ``constriction``: the coefficients of our gbest PSO instead. ``equal``: also its start at rest and reflection at
+    the bounds, as far as pyswarms offers them (its reflection keeps the velocity, ours reverses it).
+    """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
 
+    constriction: bool = False
     equal: bool = False
     particles: int = 50
 
@@ -50,12 +57,14 @@ class PySwarms:
             from pyswarms.single.global_best import GlobalBestPSO
         except ImportError:
             raise MissingDependencyError("pyswarms", "dev", "the optimizer pyswarms") from None
-        # pyswarms 1.3 documentation, "Basic Optimization"; Clerc and Kennedy 2002 for the equal ones
-        options = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298} if self.equal else {"c1": 0.5, "c2": 0.3, "w": 0.9}
+        options = CONSTRICTION if self.constriction or self.equal else EXAMPLE
         before = np.random.get_state()  # noqa: NPY002 - the only generator pyswarms knows
         np.random.seed(int(rng.integers(2**31)))  # noqa: NPY002
         try:
-            swarm = GlobalBestPSO(self.particles, len(run.bounds), options, bounds=tuple(run.bounds.T))
+            swarm = GlobalBestPSO(self.particles, len(run.bounds), options, bounds=tuple(run.bounds.T),
+                                  bh_strategy="reflective" if self.equal else "periodic")  # periodic is its default
+            if self.equal:
+                swarm.swarm.velocity = np.zeros_like(swarm.swarm.velocity)
             swarm.optimize(lambda x: np.minimum(run.evaluate(x).cost, _LARGE), _FOREVER, verbose=False)
         finally:
             np.random.set_state(before)  # noqa: NPY002
@@ -102,13 +111,19 @@ def _only_bounds(name: str, objective: Objective, bounds: ArrayLike) -> Array:
     return checked_bounds(bounds, objective.dimension)
 
 
+def constriction_pyswarms() -> PySwarms:
+    """pyswarms with the coefficients of our gbest PSO."""
+    return PySwarms(constriction=True)
+
+
 def equal_pyswarms() -> PySwarms:
-    """pyswarms with the coefficients of our default."""
+    """pyswarms as like our gbest PSO as it can be."""
     return PySwarms(equal=True)
 
 
 PEERS: dict[str, Callable[[], Any]] = {
     "pyswarms": PySwarms,
-    "pyswarms-constriction": equal_pyswarms,
+    "pyswarms-constriction": constriction_pyswarms,
+    "pyswarms-equal": equal_pyswarms,
     "pymoo-pso": Pymoo,
 }

@@ -111,6 +111,15 @@ def no_worse(first: ArrayLike, second: ArrayLike) -> float:
     return float(mannwhitneyu(first, second, alternative="greater", method="asymptotic").pvalue)
 
 
+def holm(p_values: ArrayLike) -> Array:
+    """(k,): p-values corrected for k tests (Holm 1979), to be compared with the level itself."""
+    p = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(p, kind="stable")
+    corrected = np.empty(len(p))
+    corrected[order] = np.minimum(np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1)), 1.0)
+    return corrected
+
+
 def _three(times: ArrayLike) -> Array:
     table = np.asarray(times, dtype=np.float64)
     if table.ndim != 3:
