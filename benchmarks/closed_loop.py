@@ -1,30 +1,34 @@
 """How exactly approaches end with feedback: `python -m benchmarks.closed_loop [--quick] [--trials N] [--engine E]`.
 
 Random initial wheel angles (known to the planner), start errors up to 1 cm and 1 deg (unknown), friction 0.6-1.0; pose
-measured at 20 Hz with 5 mm and 0.5 deg noise, or without noise. Every trial is seeded by its number.
+measured at 20 Hz with 5 mm and 0.5 deg noise, or without noise. Every trial is seeded by its number. Trials are kept
+as they come; ``--resume`` goes on with a run that was cut short.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
 
 import numpy as np
 
 from benchmarks.climb import step_scene
-from benchmarks.common import PROBLEMS, ResultTable, publish
+from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from trajopt.control.approach import Mode, Sensors, approach_controller
 from trajopt.maneuver import Plan, configurations, plan_configuration
 from trajopt.maneuver_problem import load_maneuver
 from trajopt.simulate.climb import run_approach, wilson
 from trajopt.simulate.engine import Command, Observation
 
-CASES = (("step_5cm.toml", "lateral left"), ("step_5cm.toml", "forward -35 deg"),
-         ("step_3_5cm.toml", "lateral left"), ("step_3_5cm.toml", "forward -35 deg"))
+FILES = ("step_5cm.toml", "step_3_5cm.toml")  # scenarios 1 and 2
+NAMES = ("lateral left", "lateral right", "forward -35 deg", "forward +35 deg", "forward -45 deg", "forward +45 deg")
+CASES = tuple((file, name) for file in FILES for name in NAMES)
 START = np.array([0.01, 0.01, math.radians(1.0)])  # m, m, rad: largest start errors (issue)
-SETTLE = 1.0  # s after the planned end until errors are taken, chosen: stretched time ends within it
+SETTLE = 1.2  # s after the planned end until errors are taken, chosen: stretched time and corrections end within it
 CAP = 30.0  # rad/s, wheel speed limit of the problems
 NOISY, EXACT = Sensors(), Sensors(position=0.0, yaw=0.0)
 # Tolerances of the issue: (position m, yaw rad, phase rad).
@@ -32,18 +36,46 @@ NOISY_BOUNDS = (0.01, math.radians(1.0), 0.1)
 EXACT_BOUNDS = (0.005, math.radians(0.5), 0.06)
 
 
+# What is switched on, what the pose sensor is like, and what is asked for.
+SETTINGS: dict[str, tuple[Mode, Sensors, tuple[float, float, float]]] = {
+    "pose and phase, noiseless": ("pose and phase", EXACT, EXACT_BOUNDS),
+    "pose and phase, noisy": ("pose and phase", NOISY, NOISY_BOUNDS),
+    "pose only, noisy": ("pose", NOISY, NOISY_BOUNDS),
+    "open loop": ("open loop", NOISY, NOISY_BOUNDS),
+}
+
+
 @dataclass(frozen=True)
 class Ending:
-    """Final errors: ``position`` m, ``yaw`` rad, ``phase`` rad (worst critical wheel, modulo a turn)."""
+    """Final errors: ``position`` m, ``yaw`` rad, ``phase`` rad (worst critical wheel, modulo a turn); ``duration``
+    s of the plan, ``lasted`` s until the reference ended, corrections included."""
 
     position: float
     yaw: float
     phase: float
+    duration: float
+    lasted: float
     exploded: bool
 
     def within(self, bounds: tuple[float, float, float]) -> bool:
         return not self.exploded and all(e <= b for e, b in zip((self.position, self.yaw, self.phase), bounds,
                                                                 strict=True))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One trial of the trial file."""
+
+    control: str
+    file: str
+    configuration: str
+    number: int
+    position: float
+    yaw: float
+    phase: float
+    duration: float
+    lasted: float
+    exploded: bool
 
 
 def trial(file: str, name: str, mode: Mode, sensors: Sensors, number: int, engine: str) -> Ending:
@@ -72,41 +104,84 @@ def trial(file: str, name: str, mode: Mode, sensors: Sensors, number: int, engin
     wheels = (recording.wheel_angles[-1] - controller.goal.wheels)[list(critical)]
     wheels = (wheels + math.pi) % (2 * math.pi) - math.pi
     turn = (pose[2] + math.pi) % (2 * math.pi) - math.pi
-    return Ending(math.hypot(pose[0], pose[1]), abs(turn), float(np.abs(wheels).max()), recording.exploded)
+    return Ending(math.hypot(pose[0], pose[1]), abs(turn), float(np.abs(wheels).max()),
+                  plan.duration, float(controller.reference.times[-1]), recording.exploded)
+
+
+def table(rows: Sequence[Row]) -> ResultTable:
+    """One line a cell, and one for all cells of a control together."""
+    lines = []
+    for control, (_, _, bounds) in SETTINGS.items():
+        ours = [r for r in rows if r.control == control]
+        cells = [[r for r in ours if (r.file, r.configuration) == case] for case in CASES]
+        for cell in (*cells, ours):
+            if not cell:
+                continue
+            good = sum(_ending(r).within(bounds) for r in cell)
+            low, high = wilson(good, len(cell))
+            sound = [(1e3 * r.position, math.degrees(r.yaw), r.phase, r.lasted - r.duration)
+                     for r in cell if not r.exploded]
+            middle, worst = np.median(np.array(sound), axis=0), np.array(sound).max(axis=0)
+            place = (cell[0].file.removesuffix(".toml"), cell[0].configuration) if cell is not ours else ("all", "all")
+            lines.append((control, *place, f"{good}/{len(cell)} ({low:.2f}-{high:.2f})",
+                          *(f"{m:.3g} / {w:.3g}" for m, w in zip(middle, worst, strict=True)),
+                          str(sum(r.exploded for r in cell))))
+    return ResultTable("Final errors of approaches, median / worst",
+                       ("control", "problem", "configuration", "within bounds", "position, mm", "yaw, deg",
+                        "phase, rad", "longer than planned, s", "exploded"), lines)
+
+
+def _ending(row: Row) -> Ending:
+    return Ending(row.position, row.yaw, row.phase, row.duration, row.lasted, row.exploded)
+
+
+def kept(file: Path) -> list[Row]:
+    """Trials of a file that an earlier run wrote."""
+    if not file.exists():
+        return []
+    with file.open(newline="", encoding="utf-8") as stream:
+        return [Row(r["control"], r["file"], r["configuration"], int(r["number"]), float(r["position"]),
+                    float(r["yaw"]), float(r["phase"]), float(r["duration"]), float(r["lasted"]),
+                    r["exploded"] == "True") for r in csv.DictReader(stream)]
+
+
+def run(file: Path, settings: Sequence[str], trials: int, engine: str, resume: bool) -> list[Row]:
+    """All trials, written to ``file`` as they come; with ``resume`` those that it holds are not repeated."""
+    rows = kept(file) if resume else []
+    known = {(r.control, r.file, r.configuration, r.number) for r in rows}
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with file.open("a" if resume and rows else "w", newline="", encoding="utf-8") as stream:
+        writer = csv.DictWriter(stream, [f.name for f in fields(Row)])
+        if not rows:
+            writer.writeheader()
+        for control in settings:
+            mode, sensors, _ = SETTINGS[control]
+            for problem, name in CASES:
+                for n in range(trials):
+                    if (control, problem, name, n) in known:
+                        continue
+                    row = Row(control, problem, name, n, **asdict(trial(problem, name, mode, sensors, n, engine)))
+                    rows.append(row)
+                    writer.writerow(asdict(row))
+                    stream.flush()
+    return rows
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="2 trials a row")
+    parser.add_argument("--quick", action="store_true", help="1 trial a row")
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--engine", default="mujoco", choices=("mujoco", "pybullet"))
+    parser.add_argument("--controls", nargs="+", default=list(SETTINGS), choices=list(SETTINGS))
+    parser.add_argument("--resume", action="store_true", help="keep the trials of a run that was cut short")
     given = parser.parse_args(arguments)
-    trials = 2 if given.quick else given.trials
-    settings: tuple[tuple[str, Mode, Sensors, tuple[float, float, float]], ...] = (
-        ("pose and phase, noisy", "pose and phase", NOISY, NOISY_BOUNDS),
-        ("pose and phase, noiseless", "pose and phase", EXACT, EXACT_BOUNDS),
-        ("pose only, noisy", "pose", NOISY, NOISY_BOUNDS),
-        ("open loop", "open loop", NOISY, NOISY_BOUNDS))
-    rows = []
-    for label, mode, sensors, bounds in settings:
-        for file, name in CASES:
-            found = [trial(file, name, mode, sensors, n, given.engine) for n in range(trials)]
-            good = sum(e.within(bounds) for e in found)
-            low, high = wilson(good, trials)
-            values = np.array([(1e3 * e.position, math.degrees(e.yaw), e.phase) for e in found if not e.exploded])
-            middle, worst = np.median(values, axis=0), values.max(axis=0)
-            rows.append((label, file.removesuffix(".toml"), name, f"{good}/{trials} ({low:.2f}-{high:.2f})",
-                         *(f"{m:.3g} / {w:.3g}" for m, w in zip(middle, worst, strict=True)),
-                         str(sum(e.exploded for e in found))))
-            print(rows[-1], flush=True)
-    table = ResultTable("Final errors of approaches, median / worst",
-                        ("control", "problem", "configuration", "within bounds", "position, mm", "yaw, deg",
-                         "phase, rad", "exploded"), rows)
-    publish(f"closed_loop_{given.engine}" + ("_quick" if given.quick else ""), [table],
-            packages=("numpy", "mujoco", "pybullet"),
-            notes=["Bounds: 10 mm, 1 deg, 0.1 rad with measurement noise and open loop; 5 mm, 0.5 deg, 0.06 rad "
-                   "without noise. Phase of open loop is that of a wheel servo that does not know the pose. Brackets: "
-                   "Wilson, 95 %."])
+    name = f"closed_loop_{given.engine}" + ("_quick" if given.quick else "")
+    rows = run(OUT / f"{name}_trials.csv", given.controls, 1 if given.quick else given.trials, given.engine,
+               given.resume)
+    publish(name, [table(rows)], packages=("numpy", "mujoco", "pybullet"), notes=[
+        "Bounds: 10 mm, 1 deg, 0.1 rad with measurement noise and open loop; 5 mm, 0.5 deg, 0.06 rad without noise. "
+        "Open loop: the wheel servo follows the planned wheel angles and does not know the pose. Brackets: Wilson, "
+        "95 %."])
 
 
 if __name__ == "__main__":

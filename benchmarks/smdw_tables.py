@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from benchmarks.climb import approach_command, plan_of, step_scene
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
+from benchmarks.smdw_figures import all_figures
 from trajopt.maneuver import configurations, plan_climb
 from trajopt.maneuver_problem import load_maneuver
 from trajopt.objectives.terminal import folded, terminal_cost, terminal_objective
@@ -36,7 +37,7 @@ GAINS, BETA = np.array([3.0, 0.125, 2.5]), 12.5  # Table 5.8
 FIRST_GAINS, FIRST_BETA = np.array([1.0, 0.125, 1.0]), 10.0  # Figures 5.15-5.18
 FIRST_GOAL = (2.0, 0.75, math.pi / 2)  # m, m, rad: Table 5.3
 # rad/s, fitted to Table 5.5 (loosely): what the thesis's drives seem to have done
-ACTUATOR = {"actuator.enabled": True, "actuator.saturation": 43.0, "actuator.dead_zone": 2.8}
+ACTUATOR: dict[str, float | bool] = {"actuator.enabled": True, "actuator.saturation": 43.0, "actuator.dead_zone": 2.8}
 EXACT = 1e-6  # cost up to which a search counts as exact
 SEARCH_COLUMNS = ("thesis", "recomputed from its deviations", "its PSO, re-run", "exact (P1, P2, heading free)")
 TABLES_6 = {"lateral left": "table_6_2_lateral", "forward -35 deg": "table_6_3_forward35",
@@ -176,6 +177,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     quick = parser.parse_args(arguments).quick
     with in_style():
         made, pictures = scenarios()
+        pictures += [_picture(name, figure) for name, figure in all_figures(quick, ACTUATOR)]
         pictures += [_picture("geometry_5cm.png", geometry_figure(DEFAULT_WHEEL, 0.05)),
                      _picture("cam.png", cam_figure(DEFAULT_WHEEL, FITTED_WHEEL))]
     tables = [geometry(), made, figures_5_15(), table_5_6(quick), table_5_5(quick), tables_6(2 if quick else 10)]

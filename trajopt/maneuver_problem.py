@@ -27,8 +27,8 @@ from trajopt.problem import (
 )
 from trajopt.robots.loc8 import WHEEL_RADIUS
 from trajopt.robots.platform import Platform
-from trajopt.robots.smdw import HUB_DEPTH, HUB_GAP, MINOR_RADIUS, loc8_smdw
-from trajopt.robots.smdw_geometry import DoubleWheel
+from trajopt.robots.smdw import loc8_smdw
+from trajopt.robots.smdw_geometry import HUB_DEPTH, HUB_GAP, MINOR_RADIUS, DoubleWheel
 from trajopt.world.free_ground import FreeGround
 
 Rank = Literal["duration", "margin", "climb_rate"]

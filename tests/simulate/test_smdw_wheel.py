@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from trajopt.errors import ArgumentError
-from trajopt.simulate.loc8_model import WHEEL_MASS
+from trajopt.robots.loc8 import WHEEL_MASS
+from trajopt.robots.smdw_geometry import DoubleWheel, support_down
 from trajopt.simulate.pybullet import MAX_JOINTS
 from trajopt.simulate.rollers import RollerWheel, Shape, outline_point, support_height
-from trajopt.simulate.smdw_wheel import HubSizes, hub_support, loc8_smdw, smdw_wheel
+from trajopt.simulate.smdw_wheel import loc8_smdw, smdw_wheel
 
-SIZES = HubSizes()
+SIZES = DoubleWheel()
 ROUND = np.linspace(-math.pi, math.pi, 3601)
 
 
@@ -25,7 +26,7 @@ def hub(wheel: RollerWheel, side: float) -> RollerWheel:
 @pytest.mark.parametrize("shape", ["spheres", "barrel", "ellipsoid"])
 def test_rollers_make_the_hub_outline(shape: Shape) -> None:
     wheel = smdw_wheel(shape=shape)
-    outline = hub_support(SIZES, ROUND)
+    outline = support_down(SIZES, ROUND)
     built = support_height(hub(wheel, 1.0), ROUND)
     circle = np.cos(ROUND) < 0.0
     assert np.max(built - outline) < 1e-6
@@ -54,10 +55,10 @@ def test_clearance_lets_a_five_centimetre_step_under_the_outer_hub() -> None:
 
 def test_contact_offsets_of_the_thesis_follow_from_the_sizes_fitted_to_them() -> None:
     # SMDW thesis, Figure 4.10: 4.63 cm at 30 deg, 3.49 cm at 60 deg; flat-faced cam, offset h'(phi)
-    sizes = HubSizes(radius=0.1029, minor_radius=0.0554)
+    sizes = DoubleWheel(radius=0.1029, minor_radius=0.0554)
     for degrees, printed in ((30.0, 0.0463), (60.0, 0.0349)):
         phi = math.radians(degrees)
-        point = outline_point(phi, lambda p: hub_support(sizes, p))
+        point = outline_point(phi, lambda p: support_down(sizes, p))
         along = point @ np.array([math.cos(phi), 0.0, -math.sin(phi)])
         assert abs(along) == pytest.approx(printed, rel=0.01)
 
@@ -72,11 +73,11 @@ def test_robot_has_the_printed_wheel_mass_and_fits_into_bullet() -> None:
 @pytest.mark.parametrize(
     ("make", "named"),
     [
-        (lambda: HubSizes(minor_radius=0.2), "minor_radius"),
-        (lambda: HubSizes(depth=0.0), "depth"),
+        (lambda: DoubleWheel(minor_radius=0.2), "minor_radius"),
+        (lambda: DoubleWheel(depth=0.0), "depth"),
         (lambda: smdw_wheel(circle_rollers=1), "rollers"),
         (lambda: smdw_wheel(mass=0.5), "mass"),
-        (lambda: smdw_wheel(HubSizes(minor_radius=0.02), ellipse_roller_radius=0.03), "roller_radius"),
+        (lambda: smdw_wheel(DoubleWheel(minor_radius=0.02), ellipse_roller_radius=0.03), "roller_radius"),
     ],
 )
 def test_impossible_wheels_name_the_argument(make: object, named: str) -> None:

@@ -12,10 +12,8 @@ from trajopt.errors import ArgumentError
 from trajopt.maneuver import Plan, configurations, plan_configuration
 from trajopt.maneuver_problem import load_maneuver
 from trajopt.problem import WHEELS
-from trajopt.robots import smdw
 from trajopt.simulate.climb import Climb, Outcome, StepScene, climb_all, judge, rate, run_climb, wilson
 from trajopt.simulate.engine import Recording
-from trajopt.simulate.smdw_wheel import HubSizes
 
 FILE = Path(__file__).parents[2] / "problems" / "smdw" / "step_5cm.toml"
 STEP = StepScene(0.05, (2.856, 0.76), 0.0, 0.8, 8.0, 0.047, 0.045, 0.03)
@@ -68,9 +66,13 @@ def test_exploded_runs_are_counted_and_left_out() -> None:
 
 
 def test_planner_and_simulator_agree_on_the_wheel() -> None:
-    sizes = HubSizes()
-    assert (sizes.radius, sizes.minor_radius, sizes.depth, sizes.gap) == (
-        smdw.DEFAULT_WHEEL.radius, smdw.DEFAULT_WHEEL.minor_radius, smdw.DEFAULT_WHEEL.depth, smdw.DEFAULT_WHEEL.gap)
+    """The robot that physics climbs with has the problem's sizes, and the planner's footprint holds its wheels."""
+    problem = load_maneuver(FILE)
+    wheel, robot = problem.robot.wheel, STEP.robot()
+    assert robot.wheels[0].radius == wheel.radius
+    assert robot.wheels[0].width <= wheel.width + 2e-3  # rollers stand a little out of the hubs' faces
+    places = [(w.l * math.cos(w.alpha), w.l * math.sin(w.alpha)) for w in problem.platform.wheels]
+    assert np.array(robot.wheel_positions) == pytest.approx(np.array(places), abs=1e-12)
 
 
 def test_planned_lateral_climb_gets_up_and_a_wall_does_not() -> None:

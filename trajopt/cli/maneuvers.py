@@ -17,7 +17,7 @@ from trajopt.cli.shared import FAULTY, Overrides, ProblemFile, console, override
 def plan(problem: ProblemFile, set_: Overrides = None,
          optimizer: Annotated[str, typer.Option(help="lattice, or any optimizer by name")] = "lattice",
          seed: Annotated[int, typer.Option(help="seed of everything random")] = 0,
-         out: Annotated[Path | None, typer.Option("--out", help="folder: a run folder a plan, best first")] = None,
+         out: Annotated[Path | None, typer.Option("--out", help="folder for pictures and a run folder a plan")] = None,
          pictures: Annotated[bool, typer.Option(help="draw pictures into the folders")] = True) -> None:
     """Plan every configuration that can climb a step, best first."""
     from trajopt.maneuver import plan_climb
@@ -42,6 +42,7 @@ def plan(problem: ProblemFile, set_: Overrides = None,
         from trajopt.pipeline import solve
         from trajopt.report.pictures import save_pictures
         from trajopt.report.run_folder import write_solution
+        from trajopt.report.smdw import save_maneuver_pictures
 
         for rank, one in enumerate(found.plans, start=1):
             folder = out / f"{rank}_{one.configuration.name.replace(' ', '_')}"
@@ -49,6 +50,8 @@ def plan(problem: ProblemFile, set_: Overrides = None,
             write_solution(solution, folder, seed=seed, command=" ".join(sys.argv))
             if pictures:
                 save_pictures(solution, folder)
+        if pictures:
+            save_maneuver_pictures(found, out)
         console.print(f"written to {out}", highlight=False)
     if not found.plans:
         raise typer.Exit(FAULTY)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from trajopt.maneuver import Maneuver, Plan
 from trajopt.report.ground_plan import draw_robot
-from trajopt.report.style import BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, VERMILION, new_figure, save_figure
+from trajopt.report.style import BLACK, BLUE, GREEN, GREY, LIGHT, ORANGE, VERMILION, in_style, new_figure, save_figure
 from trajopt.robots.smdw import (
     STEEPEST_TANGENT,
     THESIS_FORWARD_ALPHA,
@@ -133,9 +133,10 @@ def _draw_plan(ax: object, maneuver: Maneuver, plan: Plan) -> None:
 
 
 def save_maneuver_pictures(maneuver: Maneuver, folder: FilePath) -> tuple[FilePath, ...]:
-    """Write plans.png and geometry.png into ``folder``; their paths."""
+    """Write plans.png (every plan) and geometry.png (what the wheel's outline says) into ``folder``; their paths."""
     folder.mkdir(parents=True, exist_ok=True)
     plans, geometry = folder / "plans.png", folder / "geometry.png"
-    save_figure(plans_figure(maneuver), plans)
-    save_figure(geometry_figure(maneuver.problem.robot.wheel, maneuver.problem.obstacle.height), geometry)
+    with in_style():
+        save_figure(plans_figure(maneuver), plans)
+        save_figure(geometry_figure(maneuver.problem.robot.wheel, maneuver.problem.obstacle.height), geometry)
     return plans, geometry

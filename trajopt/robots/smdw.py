@@ -25,14 +25,9 @@ from trajopt.robots.smdw_geometry import DoubleWheel, Meeting, contact_offset, m
 
 Array = NDArray[np.float64]
 
-# Rc is the rolling radius. Re: 5 cm steps need Rc - Re > 5 cm, which the 4.8 cm of 0.098/0.05 m does not give and
-# the sizes fitted to the printed contact offsets (4.75 cm) do not either, although the thesis climbs 5 cm.
-MINOR_RADIUS = 0.047  # m, chosen: Rc - Re = 5.1 cm
-HUB_DEPTH = 0.045  # m along the axle, chosen: the width of its rollers
-HUB_GAP = 0.03  # m between the hubs, chosen: room for the arm that carries the wheel
-DEFAULT_WHEEL = DoubleWheel(WHEEL_RADIUS, MINOR_RADIUS, HUB_DEPTH, HUB_GAP)
+DEFAULT_WHEEL = DoubleWheel()
 # Sizes that give the printed contact offsets, 4.63 cm at 30 deg and 3.49 cm at 60 deg (Figure 4.10); fitted.
-FITTED_WHEEL = DoubleWheel(0.1029, 0.0554, HUB_DEPTH, HUB_GAP)
+FITTED_WHEEL = DoubleWheel(0.1029, 0.0554)
 
 STEEPEST_TANGENT = math.radians(10.0)  # rad, thesis 4.1.5: -10 deg < zeta_m <= 0 lets a hub land on the step
 # In forward motion a leading wheel's traction acts along its roller axis, 45 deg off the heading: beyond this alpha

@@ -23,9 +23,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
+from trajopt.robots.loc8 import WHEEL_RADIUS
 
 Array = NDArray[np.float64]
 
+# Rc is the rolling radius. Re: 5 cm steps need Rc - Re > 5 cm, which the 4.8 cm of 0.098/0.05 m does not give and
+# the sizes fitted to the printed contact offsets (4.75 cm) do not either, although the thesis climbs 5 cm.
+MINOR_RADIUS = 0.047  # m, chosen: Rc - Re = 5.1 cm
+HUB_DEPTH = 0.045  # m along the axle, chosen: the width of its rollers
+HUB_GAP = 0.03  # m between the hubs, chosen: room for the arm that carries the wheel
 CLOUD_POINTS = 36_000  # points a contour; spacing 1.8e-5 m on a 0.1 m wheel
 
 
@@ -36,10 +42,10 @@ class DoubleWheel:
     Raises ArgumentError for sizes that make no double wheel.
     """
 
-    radius: float
-    minor_radius: float
-    depth: float
-    gap: float
+    radius: float = WHEEL_RADIUS
+    minor_radius: float = MINOR_RADIUS
+    depth: float = HUB_DEPTH
+    gap: float = HUB_GAP
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.radius) and self.radius > 0):

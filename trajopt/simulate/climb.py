@@ -11,15 +11,18 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from multiprocessing import get_context
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
+from trajopt.robots.loc8 import WHEEL_RADIUS
+from trajopt.robots.smdw_geometry import DoubleWheel
 from trajopt.simulate.engine import Command, Controller, Recording, SimRobot, make_engine
 from trajopt.simulate.scene import Scene, Step
-from trajopt.simulate.smdw_wheel import HubSizes, loc8_smdw
+from trajopt.simulate.smdw_wheel import loc8_smdw
 
 Array = NDArray[np.float64]
 Four = tuple[float, float, float, float]
@@ -31,6 +34,12 @@ RAMP = 0.1  # s to full speed, chosen: the thesis switches at once
 HOLD = 0.2  # s at the end over which a wheel must have stayed up, chosen
 COAST = 0.3  # s of rest after an approach, chosen
 TIMEOUT = 1.5  # of the planned duration, SMDW thesis section 6.1
+
+
+@lru_cache(maxsize=8)
+def _built(sizes: DoubleWheel, torque: float) -> SimRobot:
+    """The robot; building its rollers takes as long as half a trial, so that trials share it."""
+    return loc8_smdw(sizes, torque_limit=torque)
 
 
 @dataclass(frozen=True)
@@ -50,8 +59,8 @@ class StepScene:
         return Scene(self.friction, Step(self.height, self.place, self.direction, width=8.0))
 
     def robot(self) -> SimRobot:
-        sizes = HubSizes(minor_radius=self.minor_radius, depth=self.hub_depth, gap=self.hub_gap)
-        return loc8_smdw(sizes, torque_limit=self.torque)
+        sizes = DoubleWheel(minor_radius=self.minor_radius, depth=self.hub_depth, gap=self.hub_gap)
+        return _built(sizes, self.torque)
 
 
 @dataclass(frozen=True)
@@ -131,8 +140,13 @@ def climb_command(climb: Climb, robot: SimRobot) -> Command:
 
 def run_climb(climb: Climb, engine: str = "mujoco") -> Outcome:
     """Sub-test 2. Raises ArgumentError for an unknown engine and what the engine raises."""
+    return judge(climb, record_climb(climb, engine))
+
+
+def record_climb(climb: Climb, engine: str = "mujoco") -> Recording:
+    """Sub-test 2, all of its motion; errors of ``run_climb``."""
     robot = climb.step.robot()
-    return judge(climb, make_engine(engine).run(robot, climb.step.scene(), climb_command(climb, robot)))
+    return make_engine(engine).run(robot, climb.step.scene(), climb_command(climb, robot))
 
 
 def judge(climb: Climb, recording: Recording) -> Outcome:
@@ -146,7 +160,7 @@ def judge(climb: Climb, recording: Recording) -> Outcome:
     lateral = climb.motion[0] == 0.0
     for i, travel in zip(climb.critical, climb.travel, strict=True):
         turned = np.abs(recording.wheel_angles[:, i] - recording.wheel_angles[0, i])
-        limit = travel / climb.step.robot().wheels[i].radius + math.pi
+        limit = travel / WHEEL_RADIUS + math.pi
         first &= bool(risen[:, i].any() and turned[np.argmax(risen[:, i])] <= limit)
         if not lateral:  # forward, the second wheel meets the step while the first one is climbing
             break

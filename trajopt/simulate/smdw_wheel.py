@@ -10,23 +10,15 @@ Figure 4.3, largest clearance for lateral motion). The hubs of left and right wh
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from trajopt.errors import ArgumentError
+from trajopt.robots.loc8 import WHEEL_MASS
+from trajopt.robots.smdw import DEFAULT_WHEEL
+from trajopt.robots.smdw_geometry import DoubleWheel, support_down
 from trajopt.simulate.engine import SimRobot
-from trajopt.simulate.loc8_model import (
-    COG_HEIGHT,
-    FRAME_MASS,
-    HALF_TRACK,
-    HALF_WHEELBASE,
-    ROLLER_ANGLE,
-    TORQUE_LIMIT,
-    WHEEL_MASS,
-    WHEEL_RADIUS,
-    loc8_on,
-)
+from trajopt.simulate.loc8_model import ROLLER_ANGLE, ROLLER_ANGLES, TORQUE_LIMIT, loc8_on
 from trajopt.simulate.rollers import (
     ROLLER_MASS,
     FloatArray,
@@ -40,45 +32,17 @@ from trajopt.simulate.rollers import (
     turned,
 )
 
-MINOR_RADIUS = 0.047  # m, chosen: Rc - Re = 5.1 cm lets a 5 cm step pass under the ellipse
 CIRCLE_ROLLER_RADIUS = 0.0095  # m, SMDW thesis section 5.3.2 (19 mm diameter)
 ELLIPSE_ROLLER_RADIUS = 0.0125  # m, SMDW thesis section 5.3.2 (25 mm diameter)
 CIRCLE_ROLLERS = 8  # a hub, chosen with the next so that 4 wheels stay below Bullet's joint limit
 ELLIPSE_ROLLERS = 6  # a hub, chosen
-HUB_DEPTH = 0.045  # m along the axle, chosen: the width of its rollers
-HUB_GAP = 0.03  # m between the hubs, chosen: room for the arm that carries the wheel
 
 
-@dataclass(frozen=True)
-class HubSizes:
-    """Outline and place of the two hubs, all in m (see the module's constants for sources)."""
-
-    radius: float = WHEEL_RADIUS
-    minor_radius: float = MINOR_RADIUS
-    depth: float = HUB_DEPTH
-    gap: float = HUB_GAP
-
-    def __post_init__(self) -> None:
-        """Raise ArgumentError for sizes that make no double wheel."""
-        if not (math.isfinite(self.minor_radius) and 0.0 < self.minor_radius <= self.radius):
-            raise ArgumentError("minor_radius", self.minor_radius, f"a length up to {self.radius:g} m")
-        if not (0.0 < self.depth < math.inf and 0.0 <= self.gap < math.inf):
-            raise ArgumentError("depth, gap", (self.depth, self.gap), "a positive depth, a gap from 0 m")
-
-    @property
-    def offset(self) -> float:
-        """Middle plane of a hub from that of the wheel [m]."""
-        return (self.gap + self.depth) / 2.0
-
-
-def hub_support(sizes: HubSizes, phi: FloatArray) -> FloatArray:
-    """Support function [m] of one hub whose ellipse is centred on normal angle 0."""
-    ellipse = np.hypot(sizes.radius * np.sin(phi), sizes.minor_radius * np.cos(phi))
-    return np.where(np.cos(phi) >= 0.0, ellipse, sizes.radius)
+HubSizes = DoubleWheel  # the name by which the climb study knows it
 
 
 def smdw_wheel(
-    sizes: HubSizes | None = None,
+    sizes: DoubleWheel = DEFAULT_WHEEL,
     *,
     angle: float = -ROLLER_ANGLE,
     outer_left: bool = True,
@@ -97,36 +61,36 @@ def smdw_wheel(
     The rollers of the ellipse share its length evenly. Raises ArgumentError naming the size that cannot
     be built.
     """
-    made = HubSizes() if sizes is None else sizes
     if circle_rollers < 2 or ellipse_rollers < 2:
         raise ArgumentError("rollers", (circle_rollers, ellipse_rollers), "at least 2 on each half of a hub")
     hub_mass = mass - 2 * (circle_rollers + ellipse_rollers) * roller_mass
     for radius in (circle_roller_radius, ellipse_roller_radius):
-        require_wheel(made.radius, radius, angle, hub_mass, roller_mass)
+        require_wheel(sizes.radius, radius, angle, hub_mass, roller_mass)
 
     def support(phi: FloatArray) -> FloatArray:
-        return hub_support(made, phi)
+        return support_down(sizes, phi)
 
     pitch = math.pi / circle_rollers
     first = math.pi / 2.0 + pitch / 2.0
     around = Seat(first, (first - pitch / 2.0, first + pitch / 2.0), circle_roller_radius, angle)
     model = place_roller(around, support, shape=shape, spheres=spheres)
-    seats = _ellipse_seats(made, ellipse_rollers, ellipse_roller_radius, angle)
+    seats = _ellipse_seats(sizes, ellipse_rollers, ellipse_roller_radius, angle)
     hub = (
         *(place_roller(seat, support, shape=shape, spheres=spheres) for seat in seats),
         *(turned(model, index * pitch) for index in range(circle_rollers)),
     )
-    side = made.offset if outer_left else -made.offset
+    offset = (sizes.gap + sizes.depth) / 2.0  # of a hub's middle plane from the wheel's
+    side = offset if outer_left else -offset
     outer = tuple(shifted(roller, side) for roller in hub)
     inner = tuple(shifted(turned(roller, math.pi), -side) for roller in hub)
     width = 2.0 * reach_along_axle(outer + inner)
-    return RollerWheel(made.radius, width, angle, outer + inner, hub_mass, roller_mass)
+    return RollerWheel(sizes.radius, width, angle, outer + inner, hub_mass, roller_mass)
 
 
-def _ellipse_seats(sizes: HubSizes, count: int, radius: float, angle: float) -> list[Seat]:
+def _ellipse_seats(sizes: DoubleWheel, count: int, radius: float, angle: float) -> list[Seat]:
     """Equal shares of the ellipse's length, which grows by h + h'' = (Rc Re)^2 / h^3 a radian."""
     phi = np.linspace(-math.pi / 2.0, math.pi / 2.0, 20001)
-    rate = (sizes.radius * sizes.minor_radius) ** 2 / hub_support(sizes, phi) ** 3
+    rate = (sizes.radius * sizes.minor_radius) ** 2 / support_down(sizes, phi) ** 3
     length = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(phi))])
     marks = np.interp(np.linspace(0.0, length[-1], 2 * count + 1), length, phi)
     return [
@@ -141,32 +105,12 @@ def shifted(roller: Roller, offset: float) -> Roller:
     return Roller((x, y + offset, z), roller.axis, roller.profile)
 
 
-def loc8_smdw(
-    sizes: HubSizes | None = None,
-    *,
-    shape: Shape = "spheres",
-    spheres: int = 7,
-    half_wheelbase: float = HALF_WHEELBASE,
-    half_track: float = HALF_TRACK,
-    frame_mass: float = FRAME_MASS,
-    wheel_mass: float = WHEEL_MASS,
-    cog_height: float = COG_HEIGHT,
-    torque_limit: float = TORQUE_LIMIT,
-) -> SimRobot:
+def loc8_smdw(sizes: DoubleWheel = DEFAULT_WHEEL, *, shape: Shape = "spheres", spheres: int = 7,
+              torque_limit: float = TORQUE_LIMIT) -> SimRobot:
     """LOC8 on four SMDW wheels whose rollers stand at -45, +45, +45, -45 deg on the ground.
 
-    Lengths [m], masses [kg], torque [N m]. Raises ArgumentError naming the size that makes no robot.
+    ``spheres`` a roller, torque [N m]. Raises ArgumentError naming the size that makes no robot.
     """
-    wheels = tuple(
-        smdw_wheel(sizes, angle=sign * ROLLER_ANGLE, outer_left=left, shape=shape, spheres=spheres, mass=wheel_mass)
-        for sign, left in ((-1.0, True), (1.0, False), (1.0, True), (-1.0, False))
-    )
-    return loc8_on(
-        wheels,
-        name=f"LOC8 SMDW ({shape})",
-        half_wheelbase=half_wheelbase,
-        half_track=half_track,
-        frame_mass=frame_mass,
-        cog_height=cog_height,
-        torque_limit=torque_limit,
-    )
+    wheels = tuple(smdw_wheel(sizes, angle=angle, outer_left=left, shape=shape, spheres=spheres)
+                   for angle, left in zip(ROLLER_ANGLES, (True, False, True, False), strict=True))
+    return loc8_on(wheels, name=f"LOC8 SMDW ({shape})", torque_limit=torque_limit)
