@@ -1,8 +1,10 @@
 """Jerk-limited motions: the time-optimal profile, smoothed in the time domain by a nonlinear program.
 
-Path parameter s, speed v and acceleration a are states at N + 1 equally spaced times, jerk is constant between
-them, the duration is free. The limits' rows hold at every node. Jerk rows on an s-grid are not convex and
-fail near rest (SOURCES 004), so time is the grid here.
+Path parameter s, speed v and acceleration a are states at N + 1 times, jerk is constant between them, the
+duration is free. The limits' rows hold at every node; rows that no motion of this kind comes near are left out of
+the program, and every row is checked afterwards. Where rows are broken between nodes the intervals are split, rows
+left out are put in, and the program is solved again from where it was. Jerk rows on an s-grid are not convex and fail
+near rest (SOURCES 004), so time is the grid here.
 """
 
 from __future__ import annotations
@@ -22,11 +24,18 @@ from trajopt.timing.trajectory import Trajectory
 
 Array = NDArray[np.float64]
 
-TABLE_POINTS = 600  # gridpoints of the rows' tables over s; chosen
+TABLE_POINTS = 1200  # gridpoints of the rows' tables over s; chosen
+_REACH = 2  # cells that a cubic B-spline mixes on either side: where rows jump, a table takes the strictest of them
 _SPEED_CAP = 4.0  # times the warm start's top speed; stands for "no bound" in the tables
 _FINE = 10  # checked points a node interval
-_WANTED_SLOWDOWN = 1.01  # of time; chosen: beyond it the nodes are doubled once
+_WANTED_SLOWDOWN = 1.01  # of time; chosen: beyond it intervals are split
 _MOST_SLOWDOWN = 1.05  # of time; chosen: beyond it the result is refused
+# Tables as the rows are, then the strictest rows around a place, and programs solved with each at most; chosen: the
+# first are closer where rows are smooth, the second hold where they jump (edges of ramps).
+_ATTEMPTS = ((False, 2), (True, 3))
+_PARTS = 3  # an interval is split into; chosen
+_SPLIT_ABOVE = 1e-3  # relative violation that splits an interval, or puts a row in; chosen
+_NEAR = 0.4  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
 _TIGHTER = 1e-3  # share by which rows are tightened at the nodes, for what happens between them; chosen
 
 
@@ -34,7 +43,7 @@ _TIGHTER = 1e-3  # share by which rows are tightened at the nodes, for what happ
 class SmoothMotion:
     """A motion with bounded jerk along the path of ``source``.
 
-    Arrays at N + 1 equally spaced ``times`` (s): ``s`` (m), ``v`` (m/s), ``a`` (m/s^2); ``jerk`` (N,), m/s^3,
+    Arrays at N + 1 ``times`` (s): ``s`` (m), ``v`` (m/s), ``a`` (m/s^2); ``jerk`` (N,), m/s^3,
     constant in between. ``slowdown`` >= 1 is the factor on time that removed what was broken between nodes.
     """
 
@@ -65,7 +74,7 @@ class SmoothMotion:
 
     def margins(self) -> dict[str, float]:
         """Least relative margin of every limit, and of the jerk's own bound, at ten points a node interval."""
-        s, v, a, _ = self.along(np.linspace(0, self.duration, _FINE * len(self.jerk) + 1))
+        s, v, a, _ = self.along(_between(self.times))
         rows = _rows(self.source, self.source.limits, np.clip(s, 0.0, self.source.path.length))
         return _margins(rows, v, a)
 
@@ -89,35 +98,71 @@ def limit_jerk(trajectory: Trajectory, jerk: float, *, nodes: int = 150, limits:
     used = trajectory.limits if limits is None else limits
     source = replace(trajectory, limits=used)
     best: SmoothMotion | None = None
-    for count in (nodes, 2 * nodes):
-        s, v, a, j, total, iterations = _solve(trajectory, used, jerk, count, tolerance)
-        times = np.linspace(0.0, total, count + 1)
-        motion = _slowed(SmoothMotion(source, times, s, v, a, j, 1.0, iterations))
-        best = motion if best is None or motion.duration < best.duration else best
-        if best.slowdown <= _WANTED_SLOWDOWN:
-            break
-    assert best is not None
+    failure: InfeasibleError | None = None
+    for strict, rounds in _ATTEMPTS:
+        shares, put_in, guess = np.full(nodes, 1 / nodes), _near(source), _first_guess(trajectory, jerk, nodes)
+        for _ in range(rounds):
+            if best is not None and best.slowdown <= _WANTED_SLOWDOWN:
+                return best
+            try:
+                found = _solve(source, jerk, shares, put_in, guess, tolerance, strict)
+            except InfeasibleError as error:
+                failure = error
+                break
+            motion, excess, rows = _slowed(found)
+            best = motion if best is None or motion.duration < best.duration else best
+            shares, guess = _finer(found, excess)
+            put_in = put_in | rows
+    if best is None:
+        assert failure is not None
+        raise failure
     if best.slowdown <= _MOST_SLOWDOWN:
         return best
     name, margin = min(best.margins().items(), key=lambda item: item[1])
-    raise InfeasibleError(name, 0.0, f"it is broken between {2 * nodes} nodes and would cost a factor of "
+    raise InfeasibleError(name, 0.0, f"it is broken between {len(best.jerk)} nodes and would cost a factor of "
                                      f"{best.slowdown:.3g} on time (least margin {margin:.2g}); take more nodes")
 
 
+def _near(source: Trajectory) -> NDArray[np.bool_]:
+    """(R,): which rows the time-optimal motion comes near to."""
+    rows = _rows(source, source.limits, source.s)
+    sdd = np.append(source.sdd, source.sdd[-1])
+    used = rows.a * sdd[:, None] + rows.b * source.sd[:, None] ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray((np.where(rows.c > 0, used / rows.c, 1.0) > _NEAR).any(axis=0))
+
+
+def _finer(motion: SmoothMotion, excess: Array) -> tuple[Array, Array]:
+    """Shares (M,) of the duration with broken intervals (and their neighbours) split, and a start there."""
+    broken = excess > _SPLIT_ABOVE
+    broken = broken | np.append(broken[1:], False) | np.append(False, broken[:-1])
+    steps = np.diff(motion.times)
+    shares = np.concatenate([np.full(_PARTS, h / _PARTS) if b else [h] for h, b in zip(steps, broken, strict=True)])
+    times = np.concatenate([[0.0], np.cumsum(shares)])
+    s, v, a, _ = motion.along(np.minimum(times, motion.duration))
+    jerk = np.repeat(motion.jerk, np.where(broken, _PARTS, 1))
+    return shares / times[-1], np.concatenate([s, v, a, jerk, [motion.duration]])
+
+
 @numpy_on_symbols(False)
-def _solve(trajectory: Trajectory, limits: tuple[Limit, ...], jerk: float, nodes: int,
-           tolerance: float) -> tuple[Array, Array, Array, Array, float, int]:
-    length, top = trajectory.path.length, float(trajectory.sd.max())
+def _solve(source: Trajectory, jerk: float, shares: Array, put_in: NDArray[np.bool_], start: Array,
+           tolerance: float, strict: bool) -> SmoothMotion:
+    """The program's motion on intervals that are ``shares`` (N,) of the duration, with the rows ``put_in`` (R,)."""
+    length, top = source.path.length, float(source.sd.max())
     grid = np.linspace(0.0, length, TABLE_POINTS)
-    rows = _rows(trajectory, limits, grid)
-    bound = np.minimum(rows.sd2_max, (_SPEED_CAP * top) ** 2)
-    width = rows.a.shape[1]
-    table = smooth_table(grid, np.column_stack([rows.a, rows.b, rows.c, 1 / bound]))
-    n = nodes
+    rows = _rows(source, source.limits, grid)
+    use = 1 / np.minimum(rows.sd2_max, (_SPEED_CAP * top) ** 2)
+    width, n = int(put_in.sum()), len(shares)
+    values = np.column_stack([rows.a[:, put_in], rows.b[:, put_in], rows.c[:, put_in], use])
+    if strict:
+        values = _without_ringing(np.column_stack([values[:, :width], _strictest(values[:, width:2 * width]),
+                                                   -_strictest(-values[:, 2 * width:3 * width]),
+                                                   _strictest(use[:, None])]))
+    table = smooth_table(grid, values)
     x = variables(3 * (n + 1) + n + 1)
     s, v, a = (x[k * (n + 1):(k + 1) * (n + 1)] for k in range(3))
     j, total = x[3 * (n + 1):4 * n + 3], x[-1]
-    h = total / n
+    h = total * shares
     dynamics = stacked([
         s[1:] - (s[:-1] + h * (v[:-1] + h * (a[:-1] / 2 + j * h / 6))),
         v[1:] - (v[:-1] + h * (a[:-1] + j * h / 2)),
@@ -130,7 +175,6 @@ def _solve(trajectory: Trajectory, limits: tuple[Limit, ...], jerk: float, nodes
     constraints = stacked([dynamics, *used])
     equal, above = np.zeros(3 * n), np.full((n + 1) * (width + 1), -np.inf)
     below = np.concatenate([np.full(n + 1, 1.0 - _TIGHTER), np.zeros((n + 1) * width)])
-    start = _first_guess(trajectory, jerk, n)
     lower = np.concatenate([np.zeros(2 * (n + 1)), np.full(n + 1, -np.inf), np.full(n, -jerk), [0.1 * start[-1]]])
     upper = np.concatenate([np.full(n + 1, length), np.full(2 * (n + 1), np.inf), np.full(n, jerk),
                             [10 * start[-1]]])
@@ -143,7 +187,22 @@ def _solve(trajectory: Trajectory, limits: tuple[Limit, ...], jerk: float, nodes
         raise InfeasibleError("jerk", 0.0, f"IPOPT found no motion with at most {jerk:g} m/s^3 "
                                            f"({result.status}); take more nodes or a larger jerk")
     parts = np.split(result.x, [n + 1, 2 * n + 2, 3 * n + 3, 4 * n + 3])
-    return parts[0], parts[1], parts[2], parts[3], float(parts[4][0]), result.iterations
+    times = np.concatenate([[0.0], np.cumsum(shares)]) * float(parts[4][0])
+    return SmoothMotion(source, times, parts[0], parts[1], parts[2], parts[3], 1.0, result.iterations)
+
+
+def _strictest(values: Array) -> Array:
+    """(M, K): the largest values within _REACH cells. Coefficients of s'' need none of it: they do not jump on a
+    path of class C2."""
+    padded = np.pad(values, ((_REACH, _REACH), (0, 0)), mode="edge")
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * _REACH + 1, axis=0).max(axis=-1))
+
+
+def _without_ringing(values: Array) -> Array:
+    """(M, K): what the cubic B-spline with coefficients ``values`` is on the grid, so that interpolation gives that
+    spline: a mean of the values within _REACH cells, while one through the values would ring at jumps and peaks."""
+    around = np.pad(values, ((1, 1), (0, 0)), mode="edge")
+    return np.asarray((around[:-2] + 4 * around[1:-1] + around[2:]) / 6)
 
 
 def _first_guess(trajectory: Trajectory, jerk: float, n: int) -> Array:
@@ -172,14 +231,24 @@ def _margins(rows: Stages, v: Array, a: Array) -> dict[str, float]:
     return found
 
 
-def _slowed(motion: SmoothMotion) -> SmoothMotion:
-    """Slowed uniformly until every row holds on the fine grid. Rest is feasible, so a factor exists."""
-    s, v, a, _ = motion.along(np.linspace(0, motion.duration, _FINE * len(motion.jerk) + 1))
+def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, NDArray[np.bool_]]:
+    """Slowed uniformly until every row holds on the fine grid (rest is feasible, so a factor exists); how far each
+    interval (N,) was broken before; which rows (R,) were."""
+    s, v, a, _ = motion.along(_between(motion.times))
     rows = _rows(motion.source, motion.source.limits, np.clip(s, 0.0, motion.source.path.length))
     used = rows.a * a[:, None] + rows.b * (v**2)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        needed = np.where(rows.c > 0, used / rows.c, 1.0).max(initial=1.0)
-        needed = max(float(needed), float(np.nanmax((v**2) / rows.sd2_max)))
-    factor = float(np.sqrt(max(1.0, needed)))
-    return SmoothMotion(motion.source, motion.times * factor, motion.s, motion.v / factor, motion.a / factor**2,
-                        motion.jerk / factor**3, factor, motion.iterations)
+        needed = np.where(rows.c > 0, used / rows.c, 1.0)
+        speed = np.nan_to_num(v**2 / rows.sd2_max)
+    worst = np.maximum(needed.max(axis=1, initial=1.0), speed)
+    factor = float(np.sqrt(worst.max()))
+    excess = worst[:-1].reshape(len(motion.jerk), _FINE).max(axis=1) - 1
+    slowed = SmoothMotion(motion.source, motion.times * factor, motion.s, motion.v / factor, motion.a / factor**2,
+                          motion.jerk / factor**3, factor, motion.iterations)
+    return slowed, excess, np.asarray((needed > 1 + _SPLIT_ABOVE).any(axis=0))
+
+
+def _between(times: Array) -> Array:
+    """``_FINE`` times in every interval, and the last."""
+    inside = times[:-1, None] + np.diff(times)[:, None] * (np.arange(_FINE) / _FINE)
+    return np.append(inside.ravel(), times[-1])

@@ -13,6 +13,7 @@ from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.speed_bound import SpeedProfile
+from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path
 from trajopt.refine import limit_jerk
 from trajopt.refine_path import corridor, optimize_path
@@ -20,6 +21,7 @@ from trajopt.refine_profile import follow
 from trajopt.robots.powerbot import powerbot
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
+from trajopt.world.ramp import Ramp, lay_over
 
 LIMITS = (Speed(1.0), Acceleration(0.5, 0.5))
 
@@ -47,6 +49,21 @@ def test_jerk_limit_on_a_bend_keeps_slip(straight: Trajectory) -> None:
     assert durations[0] > durations[1] > durations[2] > fast.duration
     with pytest.raises(ArgumentError, match="jerk"):
         limit_jerk(straight, -1.0)
+
+
+def test_jerk_limit_over_a_ramp_keeps_every_row() -> None:
+    """Slip rows jump at the ramp's rounded edges; rows left out of the program are checked like the others."""
+    path = Path.through([[0, 0], [4, 0.3], [8, 0]], start_direction=[1, 0], end_direction=[1, 0])
+    limits = [Speed(2.1), Acceleration(0.55, 7.8), Slip(0.332), Tip()]
+    fast = time_scale(lay_over(path, [Ramp((2.0, 0.0), 0.0, 4.266, 0.45, 0.35)]), limits, robot=powerbot())
+    motion = limit_jerk(fast, 2.0, nodes=80)
+    assert set(motion.margins()) == {"speed", "acceleration", "slip", "tip"}
+    assert min(motion.margins().values()) >= -1e-9
+    assert motion.slowdown < 1.01
+    assert fast.duration < motion.duration < 1.15 * fast.duration
+    steps = np.diff(motion.times)
+    for values, rates, then in ((motion.a, motion.jerk, 0.0), (motion.v, motion.a[:-1], motion.jerk * steps / 2)):
+        np.testing.assert_allclose(np.diff(values), steps * (rates + then), atol=1e-6)
 
 
 def test_joint_program_finds_the_straight_line() -> None:
