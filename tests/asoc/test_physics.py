@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from trajopt.control.asoc_reference import constant_speed, planned_speed, square_corners
+from trajopt.control.asoc_tracking import Knowledge
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.robots.asoc import TOTAL_MASS, AsocGeometry
 from trajopt.simulate.asoc_bullet import asoc_in_pybullet, asoc_urdf
@@ -61,6 +62,14 @@ def test_a_step_in_the_ground_lies_where_the_map_has_it() -> None:
         assert abs(tilted.roll_pitch[-1, 1]) < 0.06
 
 
+@pytest.mark.parametrize("engine", list(ENGINES))
+def test_odometry_knows_the_pose_on_level_ground_at_planned_speed(engine) -> None:
+    run = ENGINES[engine](GEOMETRY, level(), planned_speed(square_corners(1.0)),
+                          knowledge=Knowledge(terrain=False, update_period=np.inf))
+    assert run.rms < 0.04
+    assert run.pose[-1] == pytest.approx([0.0, 0.0, 0.0], abs=0.08)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", list(ENGINES))
 def test_square_on_level_and_rough_ground(engine) -> None:
@@ -94,8 +103,8 @@ def test_bad_input_is_refused() -> None:
 def test_a_state_that_left_physics_is_an_error() -> None:
     from trajopt.simulate.asoc_run import AsocState
 
-    upside = np.diag([1.0, -1.0, -1.0])
+    upside, none = np.diag([1.0, -1.0, -1.0]), (np.zeros(4), np.zeros((4, 2)), np.zeros((4, 2), dtype=bool))
     with pytest.raises(SimulationError, match="tipped"):
-        _pose(AsocState(np.zeros(3), upside, np.zeros(4), np.zeros((4, 2), dtype=bool)), 1.0)
+        _pose(AsocState(np.zeros(3), upside, *none), 1.0)
     with pytest.raises(SimulationError, match="finite"):
-        _pose(AsocState(np.full(3, np.nan), np.eye(3), np.zeros(4), np.zeros((4, 2), dtype=bool)), 1.0)
+        _pose(AsocState(np.full(3, np.nan), np.eye(3), *none), 1.0)

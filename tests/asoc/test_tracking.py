@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from trajopt.control.asoc_reference import constant_speed, planned_speed, require_pivots, square_corners
 from trajopt.control.asoc_tracking import (
+    FRICTION,
+    STEP,
     Knowledge,
     Tracking,
     body_twist,
@@ -24,6 +27,7 @@ from trajopt.world.rough import rough_ground
 
 GEOMETRY = AsocGeometry(4)
 SEEDS = 10
+STUDENT = 2.262  # t, two-sided 95 %, 10 seeds
 FIELD = 9.0  # m between the places of two runs
 
 
@@ -78,45 +82,64 @@ def test_on_a_plane_tilt_and_inclination_are_the_planes() -> None:
     np.testing.assert_allclose(tilt, 0.0, atol=1e-12)
 
 
+def sure_gain(gain: np.ndarray) -> bool:
+    """Whether the two-sided 95 % interval of the mean paired difference lies above 0."""
+    return bool(gain.mean() > STUDENT * gain.std(ddof=1) / np.sqrt(len(gain)))
+
+
 def test_flat_ground_and_planned_corners() -> None:
     square = square_corners()
     fast = track(GEOMETRY, level(), constant_speed(square), Knowledge())
     planned = track(GEOMETRY, level(), planned_speed(square), Knowledge())
-    assert 0.02 < fast.rms_across < fast.rms < 0.15  # printed 0.0867 m
+    assert 0.02 < fast.rms_across < fast.rms < 0.2  # printed 0.0867 m
     assert planned.rms < 0.02
     assert not fast.airborne.any()
     np.testing.assert_allclose(fast.pose, fast.estimate, atol=1e-12)
     assert fast.speed[20:].min() > 0.48 * 1.5  # Figure 30: never below 48 %
 
 
+@pytest.mark.parametrize("sigma", [0.0, 0.045])
+def test_the_body_never_changes_its_velocity_faster_than_friction_allows(sigma) -> None:
+    """Wheels that stand in a row or hang in the air could ask for any body speed."""
+    for found in run(sigma, Knowledge(), constant_speed(square_corners())):
+        rate = np.diff(found.pose, n=2, axis=0) / STEP**2
+        turning = np.abs(np.diff(found.pose[:, 2])).max() / STEP * found.speed.max()  # body axes turn with it
+        assert np.hypot(rate[:, 0], rate[:, 1]).max() < FRICTION * 9.80665 + turning + 1e-6
+        assert np.abs(rate[:, 2]).max() < 2 * FRICTION * 9.80665 / GEOMETRY.module_radius + 1e-6
+
+
 def test_error_grows_with_roughness() -> None:
-    reference = constant_speed(square_corners())
-    means = [np.mean([r.rms for r in run(sigma, Knowledge(), reference)]) for sigma in (0.0, 0.015, 0.03, 0.045)]
-    assert np.all(np.diff(means) > 0)
+    """Table IX, field by field: the fields differ in roughness alone."""
+    for make, sigmas in ((constant_speed, (0.0, 0.015, 0.03, 0.045)), (planned_speed, (0.015, 0.03, 0.045))):
+        reference = make(square_corners())
+        rms = [np.array([r.rms for r in run(sigma, Knowledge(), reference)]) for sigma in sigmas]
+        for smooth, rough in pairwise(rms):
+            assert sure_gain(rough - smooth)
 
 
 @pytest.mark.parametrize("make", [constant_speed, planned_speed])
 def test_knowledge_lowers_the_error(make) -> None:
-    """Table X's comparisons, seed by seed: mean difference above 1.8 standard errors (one-sided 5 %).
+    """Table X's comparisons, field by field.
 
-    At constant speed the corners cost 10 cm whatever the controller knows, and hide what position updates
-    gain with, and terrain knowledge under, known position: there only the large differences are asked for.
+    At constant speed the robot slides outwards at every corner by more than terrain knowledge is worth, and
+    one that ignores the terrain drives short, which makes up for it: there only the absolute position shows.
     """
     reference = make(square_corners())
     rms = {(terrain, period): np.array([r.rms for r in run(0.03, Knowledge(terrain, period), reference)])
            for terrain in (True, False) for period in (2.0, np.inf)}
-    pairs = [((True, np.inf), (False, np.inf)), ((False, 2.0), (False, np.inf))]
+    pairs = [((True, 2.0), (True, np.inf)), ((False, 2.0), (False, np.inf))]
     if make is planned_speed:
-        pairs += [((True, 2.0), (False, 2.0)), ((True, 2.0), (True, np.inf))]
+        pairs += [((True, 2.0), (False, 2.0)), ((True, np.inf), (False, np.inf))]
     for knowing, ignorant in pairs:
-        gain = rms[ignorant] - rms[knowing]
-        assert gain.mean() > 1.8 * gain.std(ddof=1) / np.sqrt(SEEDS), (knowing, ignorant)
+        assert sure_gain(rms[ignorant] - rms[knowing]), (knowing, ignorant)
 
 
-def test_dead_reckoning_is_exact_without_creep_on_flat_ground_and_runs_repeat() -> None:
-    reference = constant_speed(square_corners())
-    blind = track(GEOMETRY, level(), reference, Knowledge(update_period=np.inf))
+def test_dead_reckoning_is_exact_where_wheels_neither_creep_nor_slide_and_runs_repeat() -> None:
+    planned, reference = planned_speed(square_corners()), constant_speed(square_corners())
+    blind = track(GEOMETRY, level(), planned, Knowledge(update_period=np.inf))
     np.testing.assert_allclose(blind.pose, blind.estimate, atol=1e-9)
+    sliding = track(GEOMETRY, level(), reference, Knowledge(update_period=np.inf))
+    assert np.abs(sliding.pose - sliding.estimate).max() > 0.05  # corners at 1.5 m/s ask for more than friction has
     ground, _ = fields(0.03, 1)
     first, again = (track(GEOMETRY, ground, reference, Knowledge(False, 2.0)) for _ in range(2))
     assert np.array_equal(first.pose, again.pose)

@@ -2,11 +2,13 @@
 
 Kinematic simulation: wheels roll on the triangulated ground, module tilt beta and wheel inclination gamma
 follow from the contacts (eq. 20), and the body takes the twist that fits the wheels on the ground best. The
-body is taken to stay level on its suspension (chosen). Three things are not kinematic, kept simple and
+body is taken to stay level on its suspension (chosen). Four things are not kinematic, kept simple and
 stated: a wheel's speed follows its command as the PD loop and the robot's mass make it, never faster than
-friction allows; a wheel climbing at gamma loses CREEP tan(gamma)/friction of its travel; a wheel that the
-ground leaves faster than its suspension can follow is in the air and moves nothing, which odometry does not
-know. Several robots run at once, each on its own place on the ground.
+friction allows; nor does the body change its velocity faster than friction allows: where the wheels ask for
+more, as in a corner at full speed, they slide, which odometry does not know; a wheel climbing at gamma loses
+CREEP tan(gamma)/friction of its travel; a wheel that the ground leaves faster than its suspension can follow
+is in the air and moves nothing, which odometry does not know either. Several robots run at once, each on its
+own place on the ground.
 """
 
 from __future__ import annotations
@@ -188,10 +190,11 @@ def _driven(geometry: AsocGeometry, ground: HeightMap, reference: Reference, kno
         wanted = wheel_commands(geometry, alpha, commanded_twist(estimate, place + origins, velocity), *known)
         speeds = _wheel_loop(geometry, speeds, wanted, friction, step)
         rolled = speeds * (1 - CREEP * np.clip(np.tan(slope) / friction, -1.0, 1.0))
-        twist = body_twist(geometry, alpha, rolled, tilt, slope, 1.0 - wheel.airborne, twist)
+        rolling = body_twist(geometry, alpha, rolled, tilt, slope, 1.0 - wheel.airborne, twist)
+        twist = _gripped(geometry, twist, rolling, friction * STANDARD_GRAVITY * step)
         guess = body_twist(geometry, alpha, speeds, *known)
         links = link_velocities(geometry.positions, twist)
-        pose, estimate = _moved(pose, twist, step), _moved(estimate, guess, step)
+        pose, estimate = moved_poses(pose, twist, step), moved_poses(estimate, guess, step)
         alpha = alpha + step * steering_rates(alpha, links, geometry.offset, twist[:, 2:])
     return rows
 
@@ -230,7 +233,18 @@ def _wheel_loop(geometry: AsocGeometry, speeds: Array, wanted: Array, friction: 
     return np.asarray(speeds + np.clip(share * (wanted - speeds), -most, most))
 
 
-def _moved(pose: Array, twist: Array, step: float) -> Array:
+def _gripped(geometry: AsocGeometry, twist: Array, rolling: Array, most: float) -> Array:
+    """Body twists (M, 3) after a step: towards those at which the wheels roll, no faster than friction on the
+    whole weight can change them, ``most`` (m/s); yaw likewise, of a uniform disc with the force at the modules.
+    """
+    change = rolling - twist
+    size = np.hypot(change[:, 0], change[:, 1])
+    share = most / np.maximum(size, most)
+    turn = 2 * most / geometry.module_radius  # force times radius over mass radius^2/2
+    return twist + np.column_stack([share * change[:, 0], share * change[:, 1], np.clip(change[:, 2], -turn, turn)])
+
+
+def moved_poses(pose: Array, twist: Array, step: float) -> Array:
     """Poses (M, 3) after a step with constant body twists (midpoint heading)."""
     middle = pose[:, 2] + twist[:, 2] * step / 2
     c, s = np.cos(middle), np.sin(middle)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.control.asoc_reference import Reference
+from trajopt.control.asoc_tracking import Knowledge
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.robots.asoc import AsocGeometry
 from trajopt.robots.platform import STANDARD_GRAVITY
@@ -29,7 +30,7 @@ from trajopt.simulate.asoc_run import (
     AsocState,
     run_asoc,
 )
-from trajopt.simulate.pybullet import _bullet as load_bullet
+from trajopt.simulate.pybullet import load_bullet
 from trajopt.world.height_map import HeightMap
 
 Array = NDArray[np.float64]
@@ -40,9 +41,10 @@ MOST_POINTS = 250_000  # of a height field; Bullet copies them through Python, c
 
 
 def asoc_in_pybullet(geometry: AsocGeometry, ground: HeightMap, reference: Reference, *, friction: float = 0.6,
-                     driven_pivots: bool = False) -> AsocRun:
-    """Drive the robot along ``reference`` on ``ground``. Raises ArgumentError (also for a ground of more than
-    250,000 points), SimulationError (explosion, tip-over) and MissingDependencyError without pybullet."""
+                     driven_pivots: bool = False, knowledge: Knowledge | None = None) -> AsocRun:
+    """Drive the robot along ``reference`` on ``ground``, everything known unless ``knowledge`` says otherwise.
+    Raises ArgumentError (also for a ground of more than 250,000 points), SimulationError (explosion, tip-over)
+    and MissingDependencyError without pybullet."""
     if ground.heights.size > MOST_POINTS:
         raise ArgumentError("ground", ground.heights.shape, f"at most {MOST_POINTS} points in Bullet; crop the map")
     bullet = load_bullet()
@@ -53,7 +55,7 @@ def asoc_in_pybullet(geometry: AsocGeometry, ground: HeightMap, reference: Refer
     try:
         session = _session(bullet, client, robot, ground, reference)
         version = importlib.metadata.version("pybullet")
-        return run_asoc(session, robot, ground, reference, label=("pybullet", version))
+        return run_asoc(session, robot, ground, reference, label=("pybullet", version), knowledge=knowledge)
     finally:
         bullet.disconnect(client)
 
@@ -193,7 +195,8 @@ class _Session:
         where, attitude = b.getBasePositionAndOrientation(self.body, physicsClientId=c)
         rotation = np.array(b.getMatrixFromQuaternion(attitude), dtype=np.float64).reshape(3, 3)
         alpha = np.array([s[0] for s in b.getJointStates(self.body, self.alphas, physicsClientId=c)])
+        spins = np.array([s[1] for s in b.getJointStates(self.body, self.spins, physicsClientId=c)]).reshape(-1, 2)
         touching = {point[3] for point in b.getContactPoints(self.body, self.floor, physicsClientId=c)
                     if point[8] <= BREAKING}
         touch = np.array([spin in touching for spin in self.spins]).reshape(-1, 2)
-        return AsocState(np.array(where, dtype=np.float64), rotation, alpha, touch)
+        return AsocState(np.array(where, dtype=np.float64), rotation, alpha, spins, touch)

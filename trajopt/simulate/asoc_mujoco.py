@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.control.asoc_reference import Reference
+from trajopt.control.asoc_tracking import Knowledge
 from trajopt.errors import SimulationError
 from trajopt.robots.asoc import AsocGeometry
 from trajopt.robots.platform import STANDARD_GRAVITY
@@ -28,7 +29,7 @@ from trajopt.simulate.asoc_run import (
     AsocState,
     run_asoc,
 )
-from trajopt.simulate.mujoco import _mujoco as load_mujoco
+from trajopt.simulate.mujoco import load_mujoco
 from trajopt.world.height_map import HeightMap
 
 Array = NDArray[np.float64]
@@ -38,9 +39,10 @@ BASE = 0.5  # m of solid below the lowest point, chosen
 
 
 def asoc_in_mujoco(geometry: AsocGeometry, ground: HeightMap, reference: Reference, *, friction: float = 0.6,
-                   driven_pivots: bool = False) -> AsocRun:
-    """Drive the robot along ``reference`` on ``ground``. Raises ArgumentError, SimulationError (the model
-    cannot be built, explosion, tip-over) and MissingDependencyError without mujoco."""
+                   driven_pivots: bool = False, knowledge: Knowledge | None = None) -> AsocRun:
+    """Drive the robot along ``reference`` on ``ground``, everything known unless ``knowledge`` says otherwise.
+    Raises ArgumentError, SimulationError (the model cannot be built, explosion, tip-over) and
+    MissingDependencyError without mujoco."""
     mujoco = load_mujoco()
     robot = AsocBody(geometry, friction, driven_pivots)
     try:
@@ -58,7 +60,8 @@ def asoc_in_mujoco(geometry: AsocGeometry, ground: HeightMap, reference: Referen
     mujoco.mj_forward(model, data)
     session = _Session(mujoco, model, data, robot, tuple(
         model.geom(f"wheel{i}{w}").id for i in range(geometry.modules) for w in (1, 2)), model.geom("ground").id)
-    return run_asoc(session, robot, ground, reference, label=("mujoco", importlib.metadata.version("mujoco")))
+    return run_asoc(session, robot, ground, reference, label=("mujoco", importlib.metadata.version("mujoco")),
+                    knowledge=knowledge)
 
 
 def _start_height(robot: AsocBody, ground: HeightMap, place: Array) -> float:
@@ -142,8 +145,10 @@ class _Session:
     def state(self) -> AsocState:
         body = self.data.body("body")
         alpha = np.array([float(self.data.joint(f"alpha{i}").qpos[0]) for i in range(self.robot.geometry.modules)])
+        spins = np.array([float(self.data.joint(f"spin{i}{w}").qvel[0])
+                          for i in range(self.robot.geometry.modules) for w in (1, 2)]).reshape(-1, 2)
         pairs = self.data.contact.geom
         near = pairs[self.data.contact.dist <= 0.0]
         touched = np.unique(near[np.any(near == self.ground, axis=1)]) if len(near) else np.zeros(0)
         touch = np.isin(self.wheels, touched).reshape(-1, 2)
-        return AsocState(body.xpos.copy(), body.xmat.reshape(3, 3).copy(), alpha, touch)
+        return AsocState(body.xpos.copy(), body.xmat.reshape(3, 3).copy(), alpha, spins, touch)

@@ -2,7 +2,7 @@
 
 Robot: a body plate, N modules on vertical springs, each free to turn (alpha), its axle pivoted (beta, passive
 or driven), two driven wheels. Masses are the thesis's shares of 65 kg; what it does not print is chosen.
-The controller is that of trajopt.control.asoc_tracking with the true pose; wheels follow velocity commands.
+The controller is that of trajopt.control.asoc_tracking; wheels follow velocity commands.
 """
 
 from __future__ import annotations
@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.control.asoc_reference import Reference
-from trajopt.control.asoc_tracking import commanded_twist, ground_angles, wheel_commands
+from trajopt.control.asoc_tracking import (
+    Knowledge,
+    body_twist,
+    commanded_twist,
+    ground_angles,
+    moved_poses,
+    wheel_commands,
+)
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.objectives.asoc_design import MODULE_SHARE, RUBBER
 from trajopt.robots.asoc import TOTAL_MASS, AsocGeometry, largest_pivot
@@ -88,12 +95,13 @@ class AsocBody:
 
 @dataclass(frozen=True, eq=False)
 class AsocState:
-    """``position`` (3,) m of the body plate, its ``rotation`` (3, 3), module angles ``alpha`` (N,) rad, and
-    which wheels ``touch`` the ground (N, 2)."""
+    """``position`` (3,) m of the body plate, its ``rotation`` (3, 3), module angles ``alpha`` (N,) rad, wheel
+    ``spins`` (N, 2) rad/s, and which wheels ``touch`` the ground (N, 2)."""
 
     position: Array
     rotation: Array
     alpha: Array
+    spins: Array
     touch: NDArray[np.bool_]
 
 
@@ -146,22 +154,32 @@ class AsocRun:
 
 
 def run_asoc(session: AsocSession, robot: AsocBody, ground: HeightMap, reference: Reference, *,
-             label: tuple[str, str]) -> AsocRun:
-    """Settle, then drive along ``reference`` with the pose and the ground known. Raises SimulationError when
-    the numbers leave physics or the robot tips over."""
+             label: tuple[str, str], knowledge: Knowledge | None = None) -> AsocRun:
+    """Settle, then drive along ``reference``; pose and ground are known unless ``knowledge`` says otherwise
+    (between updates the pose is that of odometry, from wheel speeds and module angles). Raises
+    SimulationError when the numbers leave physics or the robot tips over."""
+    known = knowledge or Knowledge()
     geometry, still = robot.geometry, np.zeros((robot.geometry.modules, 2))
     begun = time.perf_counter()
     for _ in range(round(SETTLE / STEP)):
         session.advance(still, still[:, 0])
     rows: list[tuple[NDArray[Any], ...]] = []
     control = STEP * CONTROL_STRIDE
+    estimate, due = np.zeros(3), 0.0
     for moment in np.arange(0.0, reference.duration + control / 2, control):
         now = session.state()
         pose, lean = _pose(now, float(moment))
         place, velocity = reference.at(float(moment))
         rows.append((pose, lean, now.touch.ravel(), place))
-        tilt, slope, _ = ground_angles(geometry, ground, pose, now.alpha)
-        twist = commanded_twist(pose[None], place, velocity)[0]
+        tilt, slope = still[:, 0], still
+        if known.terrain:
+            tilt, slope, _ = ground_angles(geometry, ground, pose, now.alpha)
+        if moment >= due - 1e-9:
+            estimate, due = pose, due + known.update_period
+        else:
+            moved = body_twist(geometry, now.alpha, now.spins * geometry.wheel_radius, tilt, slope)
+            estimate = moved_poses(estimate[None], moved[None], control)[0]
+        twist = commanded_twist(estimate[None], place, velocity)[0]
         speeds = wheel_commands(geometry, now.alpha, twist, tilt, slope) / geometry.wheel_radius
         for _ in range(CONTROL_STRIDE):
             session.advance(speeds, tilt)

@@ -20,7 +20,7 @@ from trajopt.control.tracking import Tracker
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.simulate.engine import GRAVITY
 from trajopt.simulate.powerbot_model import DriveRobot, drive_urdf
-from trajopt.simulate.pybullet import _bullet as load_bullet
+from trajopt.simulate.pybullet import load_bullet
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import Ramp
 

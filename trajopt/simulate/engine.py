@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
+from trajopt.robots.platform import Body, Platform
+from trajopt.robots.wheel import swedish_wheel
 from trajopt.simulate.rollers import RollerWheel, Vector
 from trajopt.simulate.scene import Scene, require
 
@@ -68,18 +71,35 @@ class SimRobot:
         """Wheel centres (4, 3) in the robot frame [m]."""
         return np.array([(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)])
 
-    def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> FloatArray:
-        """Wheel speeds (4,) [rad/s] that roll without slip at body speeds (m/s, m/s, rad/s).
+    @cached_property
+    def platform(self) -> Platform:
+        """The same robot as wheels on a body: its kinematics, and the data that limits need.
 
-        The velocity of each wheel along the axis of the roller that stands on the ground is transmitted:
-        R w = vx_i + vy_i tan(angle).
+        Swedish wheels, each with the roller that touches flat ground; the footprint is the box around
+        chassis and wheels.
         """
-        speeds = []
-        for (x, y), wheel in zip(self.wheel_positions, self.wheels, strict=True):
-            along = vx - yaw_rate * y
-            across = vy + yaw_rate * x
-            speeds.append((along + across * math.tan(wheel.angle)) / wheel.radius)
-        return np.array(speeds)
+        masses = np.array([wheel.mass for wheel in self.wheels])
+        places = self.wheel_centres()
+        mass = self.chassis_mass + float(masses.sum())
+        x, y, height = (masses @ places + self.chassis_mass * np.array([0.0, 0.0, self.cog_height])) / mass
+        # wheels as points: their own inertia about the vertical is about 1 % of what their places give
+        yaw_inertia = self.inertia[2] + float(masses @ np.sum(places[:, :2] ** 2, axis=1))
+        angles = tuple(wheel.angle for wheel in self.wheels)
+        body = Body(mass, yaw_inertia, (float(x), float(y), float(height)), self.wheel_positions, angles, (True,) * 4)
+        reach = [self.chassis_size[0] / 2.0, self.chassis_size[1] / 2.0]
+        for (px, py), wheel in zip(self.wheel_positions, self.wheels, strict=True):
+            reach = [max(reach[0], abs(px) + wheel.radius), max(reach[1], abs(py) + wheel.width / 2.0)]
+        ex, ey = reach
+        wheels = tuple(
+            swedish_wheel(px, py, wheel.radius, wheel.angle)
+            for (px, py), wheel in zip(self.wheel_positions, self.wheels, strict=True)
+        )
+        return Platform(self.name, wheels, body, ((ex, ey), (-ex, ey), (-ex, -ey), (ex, -ey)), holonomic=True)
+
+    def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> FloatArray:
+        """Wheel speeds (4,) [rad/s] that roll without slip at body speeds (m/s, m/s, rad/s)."""
+        speeds: FloatArray = self.platform.inverse @ np.array([vx, vy, yaw_rate])
+        return speeds
 
 
 @dataclass(frozen=True, eq=False)

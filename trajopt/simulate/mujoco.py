@@ -65,7 +65,7 @@ class MuJoCo:
         Also raises MissingDependencyError without mujoco, and SimulationError when MuJoCo cannot build
         the model or has no graphics for a picture.
         """
-        mujoco = _mujoco()
+        mujoco = load_mujoco()
         solver = Solver(self.step, self.contact_time, self.contact_damping, self.wheel_gain, self.iterations)
         try:
             model = mujoco.MjModel.from_xml_string(scene_mjcf(robot, scene, solver, picture))
@@ -83,7 +83,8 @@ class MuJoCo:
         )
 
 
-def _mujoco() -> Any:
+def load_mujoco() -> Any:
+    """The mujoco module. Raises MissingDependencyError without it."""
     try:
         import mujoco
     except ImportError as error:

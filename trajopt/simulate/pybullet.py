@@ -94,7 +94,7 @@ class PyBullet:
                 f"{joints} joints",
                 f"at most {MAX_JOINTS} wheels and rollers (beyond, Bullet reads zeros)",
             )
-        bullet = _bullet()
+        bullet = load_bullet()
         version = importlib.metadata.version("pybullet")
         client = bullet.connect(bullet.DIRECT)
         if client < 0:
@@ -115,8 +115,11 @@ class PyBullet:
             bullet.disconnect(client)
 
 
-def _bullet() -> Any:
-    """The pybullet module, loaded without the build time that it prints when first imported."""
+def load_bullet() -> Any:
+    """The pybullet module, loaded without the build time that it prints when first imported.
+
+    Raises MissingDependencyError without pybullet.
+    """
     if "pybullet" in sys.modules and sys.modules["pybullet"] is not None:
         return sys.modules["pybullet"]
     sys.stderr.flush()
