@@ -15,7 +15,15 @@ from numpy.typing import NDArray
 from trajopt.errors import ArgumentError
 from trajopt.optimize import swarm as swarm_module
 from trajopt.optimize.base import Budget, Status
-from trajopt.optimize.pso import ParticleSwarm, constriction, falling_inertia, ring, thesis_enhanced, thesis_first
+from trajopt.optimize.pso import (
+    ParticleSwarm,
+    constriction,
+    falling_inertia,
+    local_best,
+    ring,
+    thesis_enhanced,
+    thesis_first,
+)
 from trajopt.optimize.search import minimize
 from trajopt.optimize.swarm import Swarm
 
@@ -23,7 +31,8 @@ Array = NDArray[np.float64]
 
 BOX = np.array([[-4.0, 5.0], [-3.0, 6.0], [-1.0, 2.0]])
 OPTIONS = [constriction(), ring(), falling_inertia(), thesis_first(), thesis_enhanced(),
-           ParticleSwarm(boundary="absorb", start="sobol"), ParticleSwarm(boundary="invisible", velocity_limit=0.2)]
+           ParticleSwarm(boundary="absorb", start="sobol"), local_best(), ParticleSwarm(boundary="mirror"),
+           ParticleSwarm(boundary="invisible", velocity_limit=0.2)]
 
 
 def rastrigin(x: Array) -> Array:
@@ -101,7 +110,7 @@ def test_ring_leaders_are_the_best_of_three_neighbours() -> None:
     assert swarm._ring_leaders().tolist() == [0, 2, 3, 3, 3, 0]
 
 
-@pytest.mark.parametrize("boundary", ["reset", "reflect", "absorb"])
+@pytest.mark.parametrize("boundary", ["reset", "reflect", "mirror", "absorb"])
 def test_boundary_rules_keep_candidates_inside(boundary: str) -> None:
     swarm = ParticleSwarm(boundary=boundary, inertia=1.1).swarm(BOX, np.random.default_rng(2))  # type: ignore[arg-type]
     for _ in range(50):
@@ -117,7 +126,7 @@ def test_invisible_particles_are_not_evaluated_and_a_lost_swarm_ends() -> None:
     swarm.tell(rastrigin(swarm.ask()))
     assert len(swarm.ask()) <= 47
     lost = ParticleSwarm(boundary="invisible", inertia=2.0, cognitive=0.0, social=10.0)
-    result = minimize(rastrigin, BOX, optimizer=lost, budget=Budget(evaluations=100_000))
+    result = minimize(rastrigin, BOX, optimizer=lost, budget=Budget(evaluations=20_000))
     assert result.status in (Status.CONVERGED, Status.EVALUATIONS)
     assert np.all((result.x >= BOX[:, 0]) & (result.x <= BOX[:, 1]))
 

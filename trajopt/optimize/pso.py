@@ -29,9 +29,9 @@ from trajopt.optimize.swarm import Swarm, SwarmRules
 
 Array = NDArray[np.float64]
 
-Boundary = Literal["reset", "reflect", "absorb", "invisible", "none"]
+Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
-_CHOICES = {"topology": ("gbest", "ring"), "boundary": ("reset", "reflect", "absorb", "invisible", "none"),
+_CHOICES = {"topology": ("gbest", "ring"), "boundary": ("reset", "reflect", "mirror", "absorb", "invisible", "none"),
             "start": ("uniform", "grid", "sobol")}
 
 
@@ -41,9 +41,9 @@ class ParticleSwarm:
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position inside 0.9
     of the space (thesis 000, Table 5.4) and stops the particle; "reflect" mirrors it back and reverses its
-    velocity in that dimension; "absorb" puts it on the border and stops it there; "invisible" lets it fly on
-    without evaluating it (Robinson and Rahmat-Samii 2004); "none" evaluates it outside, where it counts as
-    infeasible.
+    velocity in that dimension; "mirror" mirrors it back alone (as pyswarms's "reflective"); "absorb" puts it on
+    the border and stops it there; "invisible" lets it fly on without evaluating it (Robinson and Rahmat-Samii
+    2004); "none" evaluates it outside, where it counts as infeasible.
     ``start``: "uniform" draws positions uniformly; "grid" lays the first two variables on a grid (Table 5.4);
     "sobol" takes a Sobol sequence with a random shift.
     ``velocity_limit``: largest velocity as a share of the width of the bounds; None: unlimited.

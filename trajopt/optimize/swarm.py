@@ -210,7 +210,7 @@ class Swarm:
                 return  # no coordinate lies outside
         else:
             self._move_readably(r)
-        if rules.boundary in ("reset", "reflect", "absorb"):
+        if rules.boundary in ("reset", "reflect", "mirror", "absorb"):
             rows, columns = ((x < low) | (x > high)).nonzero()
             if len(rows):
                 _bring_back(rules.boundary, x, v, low, high, rows, columns, self.rng)
@@ -252,7 +252,8 @@ def _bring_back(boundary: str, x: Array, v: Array, low: Array, high: Array, rows
     else:
         t = np.mod((at - least) / (most - least), 2.0)
         at = least + (most - least) * np.where(t > 1.0, 2.0 - t, t)
-        v[rows, columns] *= -1.0
+        if boundary == "reflect":
+            v[rows, columns] *= -1.0
     x[rows, columns] = np.minimum(np.maximum(at, least), most)
 
 

@@ -30,8 +30,8 @@ _FOREVER = 1_000_000  # iterations; the run's budget ends searches before
 class PySwarms:
     """pyswarms's GlobalBestPSO with its documentation's options.
 
-    ``constriction``: the coefficients of our gbest PSO instead. ``equal``: also its start at rest and reflection at
-    the bounds, as far as pyswarms offers them (its reflection keeps the velocity, ours reverses it).
+    ``constriction``: the coefficients of our gbest PSO instead. ``equal``: also a start at rest and positions
+    mirrored at the bounds; ``ParticleSwarm(boundary="mirror")`` is its equal.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
@@ -117,7 +117,7 @@ def constriction_pyswarms() -> PySwarms:
 
 
 def equal_pyswarms() -> PySwarms:
-    """pyswarms as like our gbest PSO as it can be."""
+    """pyswarms with everything equal to ``ParticleSwarm(boundary="mirror")``."""
     return PySwarms(equal=True)
 
 

@@ -1,0 +1,69 @@
+"""gbest PSO is statistically no worse than pyswarms's with equal parameters; the test finds a PSO that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from trajopt.optimize.base import Budget, Optimizer
+from trajopt.optimize.pso import constriction
+from trajopt.optimize.search import minimize
+from trajopt.study.peers import equal_pyswarms
+from trajopt.study.profiles import holm, no_worse
+
+pytest.importorskip("pyswarms")
+
+Array = NDArray[np.float64]
+
+SEEDS, DIMENSION, EVALUATIONS, LEVEL = 25, 6, 5_000, 0.05
+BOX = np.tile([-3.0, 5.0], (DIMENSION, 1))  # optima off the middle
+
+
+def sphere(x: Array) -> Array:
+    return np.asarray((x * x).sum(axis=1))
+
+
+def rastrigin(x: Array) -> Array:
+    return np.asarray((x * x - 10.0 * np.cos(2 * np.pi * x) + 10.0).sum(axis=1))
+
+
+def rosenbrock(x: Array) -> Array:
+    return np.asarray((100.0 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1.0 - x[:, :-1]) ** 2).sum(axis=1))
+
+
+def ackley(x: Array) -> Array:
+    return np.asarray(20.0 - 20.0 * np.exp(-0.2 * np.sqrt((x * x).mean(axis=1))) + np.e
+                      - np.exp(np.cos(2 * np.pi * x).mean(axis=1)))
+
+
+EQUAL = replace(constriction(), boundary="mirror")
+FUNCTIONS: tuple[Callable[[Array], Array], ...] = (sphere, rastrigin, rosenbrock, ackley)
+
+
+@pytest.fixture(scope="module")
+def theirs() -> list[list[float]]:
+    return costs(equal_pyswarms())
+
+
+def costs(method: Optimizer) -> list[list[float]]:
+    return [[minimize(f, BOX, optimizer=method, seed=seed, budget=Budget(EVALUATIONS)).fun for seed in range(SEEDS)]
+            for f in FUNCTIONS]
+
+
+def test_not_significantly_worse_on_any_function(theirs: list[list[float]]) -> None:
+    p = holm([no_worse(a, b) for a, b in zip(costs(EQUAL), theirs, strict=True)])
+    assert p.min() >= LEVEL, dict(zip((f.__name__ for f in FUNCTIONS), p.tolist(), strict=True))
+
+
+def test_an_undamped_swarm_is_found_out(theirs: list[list[float]]) -> None:
+    p = holm([no_worse(a, b) for a, b in zip(costs(replace(EQUAL, inertia=0.95)), theirs, strict=True)])
+    assert p.max() < LEVEL
+
+
+def test_holm_by_hand() -> None:
+    assert holm([0.01, 0.04, 0.03]).tolist() == pytest.approx([0.03, 0.06, 0.06])
+    assert holm([0.9, 0.8]).tolist() == [1.0, 1.0]
