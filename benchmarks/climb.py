@@ -10,7 +10,8 @@ from __future__ import annotations
 import argparse
 import csv
 import math
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
@@ -62,6 +63,7 @@ class Trial:
     all_up: bool
     exploded: bool
     reason: str
+    seconds: float  # wall time, mean of its cell; nan where it was not taken
 
 
 def step_scene(problem: ManeuverProblem, friction: float, torque: float | None = None) -> StepScene:
@@ -118,9 +120,13 @@ def pso_endings(height: float, name: str, searches: int) -> list[tuple[Array, fl
     return found
 
 
-def planned(engine: str, trials: int, workers: int, sources: Sequence[str] = SOURCES) -> Iterator[list[Trial]]:
-    """Climb rates from the states that planners reach, state errors the same for all; a list a cell."""
-    for height, file in FILES.items():
+def planned(engine: str, trials: int, workers: int, sources: Sequence[str] = SOURCES,
+            files: Mapping[float, str] = FILES, known: Collection[tuple[str, ...]] = ()) -> Iterator[list[Trial]]:
+    """Climb rates from the states that planners reach, state errors the same for all; a list a cell.
+
+    Cells in ``known`` (height, configuration, source) are left out.
+    """
+    for height, file in files.items():
         problem = load_maneuver(PROBLEMS / "smdw" / file)
         for configuration in configurations(problem.robot.wheel, problem.obstacle):
             if configuration.name not in NAMES:
@@ -130,6 +136,8 @@ def planned(engine: str, trials: int, workers: int, sources: Sequence[str] = SOU
             searches = min(PSO_SEARCHES, trials) if "thesis PSO" in sources else 1
             endings = pso_endings(height, name, searches)
             for source in sources:
+                if (str(height), name, source) in known:
+                    continue
                 climbs = []
                 for n in range(trials):
                     rng = np.random.default_rng([n, round(height * 1e4), list(NAMES.values()).index(name)])
@@ -137,8 +145,10 @@ def planned(engine: str, trials: int, workers: int, sources: Sequence[str] = SOU
                     pso, turned = endings[n % len(endings)]
                     wheels = {"exact": exact, "thesis PSO": pso, "uniform": random}[source]
                     climbs.append(climb_from(problem, plan, wheels, rng, turned if source == "thesis PSO" else 0.0))
+                started = time.perf_counter()
                 outcomes = climb_all(climbs, engine=engine, workers=workers)
-                yield _rows("planned", engine, name, source, climbs, outcomes)
+                cost = (time.perf_counter() - started) / len(climbs)
+                yield _rows("planned", engine, name, source, climbs, outcomes, cost)
 
 
 def driven(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
@@ -205,9 +215,9 @@ def _at_phase(problem: ManeuverProblem, configuration: Configuration, phase: flo
 
 
 def _rows(part: str, engine: str, name: str, source: str, climbs: Sequence[Climb],
-          outcomes: Sequence[Outcome]) -> list[Trial]:
+          outcomes: Sequence[Outcome], seconds: float = math.nan) -> list[Trial]:
     return [Trial(part, engine, c.step.height, name, source, n, c.step.friction, c.step.torque, o.critical_up,
-                  o.first_attempt, o.all_up, o.exploded, o.reason)
+                  o.first_attempt, o.all_up, o.exploded, o.reason, seconds)
             for n, (c, o) in enumerate(zip(climbs, outcomes, strict=True))]
 
 
@@ -218,10 +228,11 @@ def rate_table(title: str, trials: Sequence[Trial]) -> ResultTable:
         cell = [t for t in trials if (t.engine, t.height, t.configuration, t.source) == key]
         shares = [_share([bool(getattr(t, what)) for t in cell if not t.exploded], sum(t.exploded for t in cell))
                   for what in ("critical_up", "first_attempt", "all_up")]
+        cost = "" if math.isnan(cell[0].seconds) else f"{cell[0].seconds:.2f}"
         rows.append((key[0], f"{100 * key[1]:g}", key[2], key[3], *(_text(s) for s in shares),
-                     str(shares[0].exploded), THESIS[key[2], key[1]]))
+                     str(shares[0].exploded), cost, THESIS[key[2], key[1]]))
     return ResultTable(title, ("engine", "step, cm", "configuration", "planned by", "critical wheels up",
-                               "first attempt", "all four up", "exploded", "thesis"), rows)
+                               "first attempt", "all four up", "exploded", "s a trial", "thesis"), rows)
 
 
 def _share(values: list[bool], exploded: int) -> Rate:
@@ -257,17 +268,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--parts", nargs="+", default=["planned", "driven", "phases"])
     parser.add_argument("--sources", nargs="+", default=list(SOURCES), help="planners of part 'planned'")
+    parser.add_argument("--heights", nargs="+", type=float, default=list(FILES), choices=list(FILES), help="m")
+    parser.add_argument("--resume", action="store_true", help="keep the cells of the trial file of part 'planned'")
     given = parser.parse_args(arguments)
     trials, parts = (2, ["planned"]) if given.quick else (given.trials, given.parts)
     name = f"climb_{given.engine}" + ("_quick" if given.quick else "")
+    files = {height: FILES[height] for height in given.heights}
     cells: dict[str, list[Trial]] = {}
+    for trial in kept(name) if given.resume else []:
+        if trial.part == "planned" or trial.part not in parts:
+            cells.setdefault(trial.part, []).append(trial)
+    done = {(str(t.height), t.configuration, t.source) for t in cells.get("planned", [])}
     for part in parts:
-        work = {"planned": lambda: planned(given.engine, trials, given.workers, given.sources),
+        work = {"planned": lambda: planned(given.engine, trials, given.workers, given.sources, files, done),
                 "driven": lambda: driven(given.engine, trials, given.workers),
                 "phases": lambda: phases(given.engine, given.runs, given.workers)}[part]()
         for rows in work:  # written after every cell, so that a run cut short is kept
             cells.setdefault(part, []).extend(rows)
-            _keep(name, [row for known in cells.values() for row in known])
+            _keep(name, [row for cell in cells.values() for row in cell])
     publish(name, [_table(part, rows) for part, rows in cells.items()], packages=PACKAGES, notes=[NOTE])
 
 
@@ -282,6 +300,19 @@ def _table(part: str, rows: Sequence[Trial]) -> ResultTable:
         return phase_table(rows)
     return rate_table("Sub-test 2 from planned states" if part == "planned" else
                       "Sub-test 1 open loop, then sub-test 2", rows)
+
+
+def kept(name: str) -> list[Trial]:
+    """Trials that an earlier run wrote."""
+    file = OUT / f"{name}_trials.csv"
+    if not file.exists():
+        return []
+    with file.open(newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    return [Trial(r["part"], r["engine"], float(r["height"]), r["configuration"], r["source"], int(r["number"]),
+                  float(r["friction"]), float(r["torque"]), r["critical_up"] == "True", r["first_attempt"] == "True",
+                  r["all_up"] == "True", r["exploded"] == "True", r["reason"], float(r.get("seconds") or math.nan))
+            for r in rows]
 
 
 def _keep(name: str, rows: Sequence[Trial]) -> None:

@@ -12,6 +12,7 @@ import csv
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -154,16 +155,15 @@ def run(file: Path, settings: Sequence[str], trials: int, engine: str, resume: b
         writer = csv.DictWriter(stream, [f.name for f in fields(Row)])
         if not rows:
             writer.writeheader()
-        for control in settings:
-            mode, sensors, _ = SETTINGS[control]
-            for problem, name in CASES:
-                for n in range(trials):
-                    if (control, problem, name, n) in known:
-                        continue
-                    row = Row(control, problem, name, n, **asdict(trial(problem, name, mode, sensors, n, engine)))
-                    rows.append(row)
-                    writer.writerow(asdict(row))
-                    stream.flush()
+        for n in range(trials):  # outermost, so that a run cut short has as many trials in every cell
+            for control, (problem, name) in product(settings, CASES):
+                if (control, problem, name, n) in known:
+                    continue
+                mode, sensors, _ = SETTINGS[control]
+                row = Row(control, problem, name, n, **asdict(trial(problem, name, mode, sensors, n, engine)))
+                rows.append(row)
+                writer.writerow(asdict(row))
+                stream.flush()
     return rows
 
 

@@ -141,7 +141,8 @@ def geometry() -> ResultTable:
 
 def scenarios() -> tuple[ResultTable, list[str]]:
     """The thesis's six searches (Tables 6.1, 6.6): its PSO re-run against the exact planner; pictures of the plans."""
-    rows, pictures = [], []
+    rows: list[tuple[str, ...]] = []
+    pictures = []
     for number in (1, 2):
         for name in ("lateral", "forward35", "forward45"):
             file = PROBLEMS / "smdw" / f"scenario_{number}_{name}.toml"

@@ -147,8 +147,9 @@ class Maneuver:
             best = self.plans[0]
             return (f"{len(self.plans)} of {len(self.plans) + len(self.refused)} configurations have a plan; best by "
                     f"{self.problem.approach.rank}: {best.configuration.name}, {best.duration:.2f} s")
-        reasons = sorted({r.reason for r in self.refused})
-        return "no configuration has a plan: " + "; ".join(reasons)
+        first, others = self.refused[0], len(self.refused) - 1
+        more = f" ({others} other configurations have none either)" if others else ""
+        return f"no configuration has a plan; {first.configuration.name}: {first.reason}{more}"
 
 
 def configurations(wheel: DoubleWheel, obstacle: ObstacleSection, start_yaw: float = 0.0) -> tuple[Configuration, ...]:

@@ -35,7 +35,7 @@ def plan(problem: ProblemFile, set_: Overrides = None,
                       f"{one.wheel_error:.1e}", f"{100 * one.room:.1f}", f"{one.margin:.2f}", f"{one.climb_rate:.0%}")
     if found.plans:
         console.print(table)
-    for none in found.refused:
+    for none in found.refused if found.plans else ():  # the status names why there is no plan at all
         console.print(f"no plan for {none.configuration.name}: {none.reason}", highlight=False)
     if out is not None:
         from trajopt.optimize.given import Given

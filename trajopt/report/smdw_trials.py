@@ -93,8 +93,9 @@ def phase_map_figure(shares: Mapping[tuple[str, float], Mapping[tuple[float, flo
     for ax, (panel, rows) in zip(grid.ravel(), sorted(shares.items()), strict=False):
         values = np.array(list(rows.values()), dtype=np.float64)
         drawn = ax.imshow(values, aspect="auto", cmap="viridis", vmin=0, vmax=1, interpolation="nearest")
-        ax.set_xticks(range(len(phases)), [f"{p:+.1f}" for p in phases])
-        ax.set_yticks(range(len(rows)), [f"{torque:g} N m, {friction:g}" for torque, friction in rows])
+        ax.set_xticks(range(0, len(phases), 2), [f"{p:+.1f}" for p in phases[::2]])
+        ax.set_yticks(range(len(rows)), [f"{torque:g} N m, \N{GREEK SMALL LETTER MU} {friction:g}"
+                                         for torque, friction in rows])
         ax.set(title=f"{panel[0]}, {100 * panel[1]:g} cm", xlabel="phase at contact (rad)")
         ax.grid(False)
     if drawn is not None:
@@ -162,8 +163,9 @@ def searches_figure(groups: Sequence[tuple[str, Sequence[tuple[str, Array]]]], g
     """Paths (N, 2), m, that searches found: a panel a group, a labelled line a search (Figures 5.23-5.25)."""
     from matplotlib import colormaps
 
-    figure = new_figure(3.3, 8.4)
-    for ax, (title, lines) in zip(figure.subplots(1, len(groups), squeeze=False).ravel(), groups, strict=True):
+    figure = new_figure(3.6, 8.4)
+    for ax, (title, lines) in zip(figure.subplots(1, len(groups), squeeze=False, sharex=True, sharey=True).ravel(),
+                                  groups, strict=True):
         for k, (label, path) in enumerate(lines):
             colour = colormaps["viridis"](k / max(len(lines) - 1, 1))
             ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.0, label=label)
