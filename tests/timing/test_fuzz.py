@@ -24,6 +24,10 @@ def random_points(rng: np.random.Generator) -> np.ndarray:
         points[:, 0] = np.sort(points[:, 0])
     if points.shape[1] == 3:
         points[:, 2] *= rng.choice([0.0, 0.05, 0.3, 3.0])
+    if rng.random() < 0.1:  # on one line: it doubles back, or not
+        points = rng.normal(0, 1, (n, 1)) * points[:1]
+    if rng.random() < 0.05:
+        points[:] = points[0]  # of length zero
     if rng.random() < 0.1:
         points[-1] = points[-2]
     if rng.random() < 0.1:
@@ -65,6 +69,8 @@ def test_a_motion_that_holds_or_an_error_with_limit_and_place(seed):
     extra: dict[str, object] = {"gridpoints": 40, "engine": rng.choice(["auto", "compiled", "linear", "segments"])}
     if rng.random() < 0.4:
         extra["start_speed"] = float(rng.choice([0.3, 3.0, *ODD]))
+    if rng.random() < 0.3:
+        extra["too_fast"] = "brake"
     if rng.random() < 0.4:
         extra["end_speed"] = float(rng.choice([0.3, 3.0, *ODD]))
     outcome = attempt(rng, extra)
@@ -80,6 +86,10 @@ def test_a_motion_that_holds_or_an_error_with_limit_and_place(seed):
     assert np.isfinite(result.duration)
     assert result.duration > 0
     assert min(result.margins().values()) >= -1e-9
+    d = result.path.position(np.linspace(result.path.start, result.path.end, 2001), 1)
+    d = d[:, :2] / np.hypot(d[:, 0], d[:, 1])[:, None]
+    if result.path.heading is None:  # nowhere does the direction of travel turn round between neighbours
+        assert np.sum(d[1:] * d[:-1], axis=1).min() > -0.9999
     state = result.at(np.linspace(0, result.duration, 7))
     for values in (state.pose, state.twist, state.wheel_angles, state.wheel_speeds):
         assert np.all(np.isfinite(values))

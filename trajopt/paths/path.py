@@ -18,6 +18,7 @@ from trajopt.paths.spline import SplineBasis, chord_length_knots
 
 Array = NDArray[np.float64]
 
+_STANDSTILL_SAMPLES = 9  # a segment, before roots are looked for; chosen
 _CELLS_PER_SEGMENT = 64  # quadrature cells a spline segment: length error below 1e-12 on smooth paths
 _LARGEST = 1e7  # m (and rad): farther than any robot drives; squares of it keep nine digits of a metre. Chosen
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
@@ -155,6 +156,35 @@ class Path:
         if self.heading is not None:
             squares = squares + (self.turning_length * self.yaw(u, 1)) ** 2
         return np.asarray(np.sqrt(squares))
+
+    def standstill(self, share: float) -> float | None:
+        """Spline parameter u where ds/du is below ``share`` of its mean, where the path stands still or doubles
+        back; None where there is no such place.
+
+        Exact: on a segment (ds/du)^2 is a quartic, least at an end or at a root of its derivative. Segments whose
+        ds/du cannot fall to zero between samples, since its slope is bounded, are passed over.
+        """
+        knots, cubics = self._cubics
+        scale = np.ones(cubics.shape[2])
+        if self.heading is not None:
+            scale[-1] = self.turning_length
+        _, b, c, d = np.moveaxis(cubics * scale, 1, 0)
+        widths = np.diff(knots)
+        inside = widths[:, None] * np.linspace(0.0, 1.0, _STANDSTILL_SAMPLES)
+        rates = np.linalg.norm(b[:, None] + inside[..., None] * (2 * c[:, None] + 3 * inside[..., None] * d[:, None]),
+                               axis=2)
+        steepest = np.maximum(np.linalg.norm(2 * c, axis=1), np.linalg.norm(2 * c + 6 * widths[:, None] * d, axis=1))
+        possible = rates.min(axis=1) <= steepest * widths / (_STANDSTILL_SAMPLES - 1)
+        places = [knots]
+        for k in np.flatnonzero(possible):
+            slope = [18 * d[k] @ d[k], 18 * c[k] @ d[k], 4 * c[k] @ c[k] + 6 * b[k] @ d[k], 2 * b[k] @ c[k]]
+            roots = np.roots(slope)
+            here = roots.real[np.abs(roots.imag) <= 1e-6 * widths[k]]
+            places.append(knots[k] + here[(here > 0) & (here < widths[k])])
+        u = np.concatenate(places)
+        slow = self.rate(u)
+        at = int(np.argmin(slow))
+        return float(u[at]) if slow[at] < share * self.length / (self.end - self.start) else None
 
     @cached_property
     def _table(self) -> tuple[Array, Array]:

@@ -39,12 +39,23 @@ class PathSamples:
     slope: Array  # (N,) rad, positive uphill along the direction of travel
 
 
+_STANDS = 1e-9  # share of the path's rate ds/du below which it stands still
+_STILL = ("the path stands still or doubles back here; move or drop a control point, or split the path at the stop")
+
+
 def sample_path(path: Path, s: Array) -> PathSamples:
     """Samples of ``path`` at path parameters ``s`` (N,) in [0, path.length].
 
     Raises InfeasibleError where the path stands still or doubles back (no direction of travel there).
     """
     return sample_at(path, s, path.locate(s))
+
+
+def require_moving(path: Path) -> None:
+    """Raises InfeasibleError where the path stands still or doubles back, also between samples."""
+    u = path.standstill(_STANDS)
+    if u is not None:
+        raise InfeasibleError("path", float(path.parameter([u])[0]), _STILL)
 
 
 def sample_at(path: Path, s: Array, u: Array) -> PathSamples:
@@ -64,10 +75,9 @@ def _by_path_parameter(s: Array, c1: Array, c2: Array, c3: Array) -> tuple[Array
     """First to third derivative along s of coordinates whose derivatives along u are c1, c2, c3 (N, D)."""
     g = np.sqrt(np.sum(c1**2, axis=1))
     scale = float(np.max(g)) if len(g) else 0.0
-    if not scale > 0 or np.any(g < 1e-9 * scale):
+    if not scale > 0 or np.any(g < _STANDS * scale):
         place = float(s[int(np.argmin(g))]) if len(g) else 0.0
-        raise InfeasibleError("path", place, "the path stands still or doubles back here; move or drop a "
-                                             "control point, or split the path at the stop")
+        raise InfeasibleError("path", place, _STILL)
     g = g[:, None]
     g1 = np.sum(c1 * c2, axis=1)[:, None] / g
     g2 = (np.sum(c2 * c2 + c1 * c3, axis=1)[:, None] - g1**2) / g

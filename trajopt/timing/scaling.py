@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
-from trajopt.paths.samples import sample_at
+from trajopt.paths.samples import require_moving, sample_at
 from trajopt.robots.platform import Platform
 from trajopt.timing.compiled import controllable_sets
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
@@ -144,6 +144,7 @@ def _job(path: Path, limits: Sequence[Limit], robot: Platform | None, terrain: T
 
 def _require_drivable(job: _Job, u: Array) -> None:
     """Raises InfeasibleError where the path has no direction, or the robot's wheels forbid its twist."""
+    require_moving(job.path)
     twist = sample_at(job.path, job.path.parameter(u), u).twist
     if job.robot is None:
         return
