@@ -9,7 +9,7 @@ import argparse
 import itertools
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,53 +25,44 @@ from benchmarks.asoc_reference import (
     TABLE_9,
     TABLE_10,
 )
+from benchmarks.asoc_tables_tracking import (
+    FULL,
+    GEOMETRY,
+    KNOWLEDGE,
+    QUICK,
+    Effort,
+    physics,
+    physics_knowledge,
+    runs,
+    tables_9_and_10,
+)
 from benchmarks.common import OUT, ResultTable, publish
-from trajopt.control.asoc_reference import Reference, constant_speed, planned_speed, square_corners
-from trajopt.control.asoc_tracking import Knowledge, Tracking, track_many
-from trajopt.errors import SimulationError, TrajoptError
+from trajopt.control.asoc_reference import constant_speed, square_corners
+from trajopt.control.asoc_tracking import Knowledge
+from trajopt.errors import TrajoptError
 from trajopt.objectives.asoc_design import TERMS, AsocDesign, Model, best_width, full_factorial
-from trajopt.optimize.base import Budget
+from trajopt.optimize.base import Budget, Optimizer
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.pareto import ParetoFront, pareto_front
+from trajopt.optimize.pso import thesis_enhanced, thesis_first
 from trajopt.optimize.search import minimize, optimizer_names
 from trajopt.report.asoc import curve_figure, front_figure, map_figure, speed_figure, tracks_figure
 from trajopt.report.platform_picture import platform_figure
 from trajopt.report.style import in_style, save_figure
-from trajopt.robots.asoc import AsocGeometry, asoc_platform, largest_pivot, wheel_steering
+from trajopt.robots.asoc import asoc_platform, largest_pivot, wheel_steering
 from trajopt.robots.isotropy import Contact, best_ratio, mean_isotropy, spread_modules
 from trajopt.robots.mobility import mobility_of
 from trajopt.robots.named import NAMED
 from trajopt.robots.soil import soil_named
 from trajopt.robots.suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
-from trajopt.simulate.asoc_bullet import asoc_in_pybullet
-from trajopt.simulate.asoc_mujoco import asoc_in_mujoco
 from trajopt.simulate.asoc_run import AsocRun
-from trajopt.world.height_map import HeightMap
-from trajopt.world.rough import rough_ground
 
 Array = NDArray[np.float64]
 
 PACKAGES = ("trajopt", "numpy", "scipy", "casadi", "pymoo", "mujoco", "pybullet")
-GEOMETRY = AsocGeometry(4)
-FIELD = 9.0  # m between the places of two runs on one ground, chosen
 FIGURES = OUT / "asoc"
-STUDENT = {3: 4.303, 10: 2.262}  # t, two-sided 95 %, by number of seeds
+RESTARTED = 200_000  # evaluations of the thesis's undamped swarms in restarts; ten seeds end at most 0.44 % short
 BASELINE = (0.15, 0.20, 0.15, 0.03)  # m, Table VI: offset, split, radius, width
-PHYSICS_SEED = 3  # of the rough ground in the engines
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How much a run may take."""
-
-    points: int
-    seeds: int
-    physics: tuple[float, ...]  # sigmas, m
-    pareto: int  # generations
-
-
-FULL = Effort(4096, 10, (0.0, 0.015, 0.03, 0.045), 100)
-QUICK = Effort(512, 3, (), 20)
 
 
 def mean(places: Array, ratio: float, effort: Effort, **options: object) -> float:
@@ -184,9 +175,14 @@ def optimizers(effort: Effort) -> ResultTable:
     best, total = full_factorial(design)
     rows.append(("full factorial 31^4", f"{total:.5f}", "", "923521", f"{1e3 * (time.perf_counter() - began):.0f}",
                  " ".join(f"{v:.4f}" for v in best), ""))
-    budget = Budget(evaluations=25_000 if effort is FULL else 6_000)
-    for name in ("ipopt, 1 start", *optimizer_names()):
-        method = Ipopt(starts=1) if name == "ipopt, 1 start" else name
+    evaluations = 25_000 if effort is FULL else 6_000
+    special: dict[str, tuple[Optimizer, int]] = {
+        "ipopt, 1 start": (Ipopt(starts=1), evaluations),
+        "pso-thesis-first, restarts": (replace(thesis_first(), stagnation=20, restart=True), RESTARTED),
+        "pso-thesis-enhanced, restarts": (replace(thesis_enhanced(), stagnation=20, restart=True), RESTARTED)}
+    for name in (*special, *optimizer_names()):
+        method, allowed = special.get(name, (name, evaluations))
+        budget = Budget(evaluations=allowed)
         try:
             minimize(design, design.bounds, optimizer=method, budget=Budget(evaluations=10))  # loads packages
             began = time.perf_counter()
@@ -213,79 +209,6 @@ def pareto(effort: Effort) -> tuple[ResultTable, ParetoFront, AsocDesign]:
                      " ".join(f"{v:.3f}" for v in front.designs[i])))
     return ResultTable(f"Pareto front (NSGA-II, {len(front.terms)} designs), terms as shares of the factorial's best",
                        ("design", *TERMS, "offset split gap width, m"), rows), front, design
-
-
-def places(sigma: float, seeds: int) -> tuple[HeightMap, Array]:
-    """One ground with ``seeds`` independent fields in a row."""
-    ground = rough_ground(sigma, rng=np.random.default_rng(11), size=FIELD * seeds)
-    return replace(ground, origin=(-2.0, -2.0)), np.column_stack([FIELD * np.arange(seeds), np.zeros(seeds)])
-
-
-def runs(sigma: float, knowledge: Knowledge, reference: Reference, effort: Effort) -> list[Tracking]:
-    ground, origins = places(sigma, effort.seeds)
-    return track_many(GEOMETRY, ground, reference, [knowledge] * effort.seeds, origins)
-
-
-def interval(values: Sequence[float]) -> str:
-    """Mean and 95 % interval in percent of the body length (1 m)."""
-    array = 100 * np.array(values)
-    half = STUDENT[len(array)] * array.std(ddof=1) / np.sqrt(len(array))
-    return f"{array.mean():.2f} +- {half:.2f}"
-
-
-def tables_9_and_10(effort: Effort) -> tuple[ResultTable, ResultTable]:
-    fast, planned = constant_speed(square_corners()), planned_speed(square_corners())
-    rows = []
-    for sigma, printed in TABLE_9.items():
-        found = [runs(sigma / 100, Knowledge(), reference, effort) for reference in (fast, planned)]
-        rows.append((f"{sigma:g}", f"{printed:.2f}", *(interval([r.rms for r in part]) for part in found),
-                     *(interval([r.rms_across for r in part]) for part in found),
-                     f"{np.degrees(max(np.abs(r.inclination).max() for r in found[0])):.0f}",
-                     f"{100 * np.mean([r.airborne.mean() for r in found[0]]):.1f}"))
-    header = ("sigma, cm", "printed", "ours", "planned corners", "across, ours", "across, planned",
-              "steepest wheel, deg", "wheels in the air, %")
-    nine = ResultTable("Table IX: RMS error, % of body length (1 m), kinematic, ground and position known", header,
-                       rows)
-    rows = []
-    for (position, terrain), printed in TABLE_10.items():
-        knowledge = Knowledge(terrain, 2.0 if position else np.inf)
-        found = [runs(0.03, knowledge, reference, effort) for reference in (fast, planned)]
-        rows.append(("0.5 Hz" if position else "dead reckoning", "known" if terrain else "unknown", f"{printed:.2f}",
-                     *(interval([r.rms for r in part]) for part in found),
-                     *(interval([r.rms_across for r in part]) for part in found)))
-    ten = ResultTable("Table X: RMS error by knowledge, sigma 3 cm (not printed; chosen)",
-                      ("position", "ground", "printed", "ours", "planned corners", "across, ours", "across, planned"),
-                      rows)
-    return nine, ten
-
-
-def ground_of(sigma: float) -> HeightMap:
-    if sigma == 0:
-        return HeightMap(np.zeros((40, 40)), 0.25, (-2.5, -2.5))
-    return replace(rough_ground(sigma, rng=np.random.default_rng(PHYSICS_SEED), size=FIELD), origin=(-2.0, -2.0))
-
-
-def physics(effort: Effort) -> tuple[ResultTable, list[tuple[str, AsocRun]]]:
-    rows, kept = [], []
-    commands = {"1.5 m/s": constant_speed(square_corners()), "planned": planned_speed(square_corners())}
-    cases = itertools.product((asoc_in_pybullet, asoc_in_mujoco), effort.physics, commands, (False, True))
-    for drive, sigma, command, driven in cases:
-        if driven and sigma != 0.015:
-            continue
-        name = drive.__name__.rsplit("_", 1)[1]
-        label = (name, f"{100 * sigma:g}", command, "driven" if driven else "passive")
-        try:
-            run = drive(GEOMETRY, ground_of(sigma), commands[command], driven_pivots=driven)
-        except SimulationError as error:
-            rows.append((*label, "", "", "", "", str(error)))
-            continue
-        if not driven:
-            kept.append((f"{name}, {100 * sigma:g} cm, {command}", run))
-        rows.append((*label, f"{100 * run.rms:.2f}", f"{100 * run.rms_across:.2f}", str(run.losses),
-                     f"{100 * run.airborne_share:.1f}", f"{run.times[-1] / run.wall_time:.1f} x real time"))
-    return ResultTable("Physics: 65 kg, friction 0.6; RMS error in % of body length (printed for sigma 0: 8.67)",
-                       ("engine", "sigma, cm", "speed", "pivots", "RMS", "RMS across", "contacts lost",
-                        "wheels in the air, %", "note"), rows), kept
 
 
 def draw_isotropy(effort: Effort) -> None:
@@ -320,7 +243,7 @@ def draw_tracking(effort: Effort, physical: list[tuple[str, AsocRun]]) -> None:
     save_figure(speed_figure([(n, r.times[:-1], r.speed) for n, r in known[::3]], 1.5, "Figure 30: speed"),
                 FIGURES / "figure_30.png")
     blind = [(f"{'0.5 Hz' if p else 'dead reckoning'}, ground {'known' if t else 'unknown'}",
-              runs(0.03, Knowledge(t, 2.0 if p else np.inf), fast, effort)[0].pose[:, :2]) for p, t in TABLE_10]
+              runs(0.03, KNOWLEDGE[p, t], fast, effort)[0].pose[:, :2]) for p, t in TABLE_10]
     save_figure(tracks_figure(corners, blind, "Figure 31: by knowledge, sigma 3 cm"), FIGURES / "figure_31.png")
     level = [(name, run.pose[:, :2]) for name, run in physical if ", 0 cm" in name]
     if level:
@@ -350,7 +273,17 @@ NOTES = (
     "not tuned. Table IV and column K of Table VI are not reproduced.",
     "Section 3.5's pivot is 39.2 deg by eq. 8, not the printed 30. Linkage sizes are chosen: none are printed.",
     "Tables IX, X: order and trend are the result; absolute values depend on inertias, gains and mesh that are not "
-    "printed. At constant speed the corners cost 10 cm whatever the controller knows.",
+    "printed. Table X's sigma is not printed either. The paired table compares the same fields with and without. At "
+    "1.5 m/s a corner asks for 22 m/s^2 across the axles, friction has 5.9: the robot slides outwards (15.6 cm RMS on "
+    "level ground, where 8.67 is printed), odometry does not see it, and a robot that ignores the ground drives short, "
+    "which makes up for part of the slide: terrain knowledge cannot show there. With planned corners nothing slides "
+    "and both kinds of knowledge show.",
+    "Physics: in MuJoCo wheels hop on 3 cm bumps (half of the time off the ground), and what odometry then misses "
+    "hides what terrain knowledge is worth by dead reckoning.",
+    "Optimizers: the thesis's swarms have no inertia weight below 1, so nothing damps them. The first flies out of the "
+    "space for good within some 200 iterations; the second, reset to the space, samples on. One swarm ends 1 to 3 % "
+    "short whatever its budget; restarted from the best candidate after 20 iterations without improvement both come "
+    "within 1 %.",
 )
 
 
@@ -358,15 +291,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="coarser quadrature, fewer seeds, no physics")
     effort = QUICK if parser.parse_args(arguments).quick else FULL
+    began = time.perf_counter()
     front_table, front, design = pareto(effort)
     tables = [mobility(), table_1(effort), table_2(effort), figures_9_and_11(effort), table_4(), table_5(),
               optimizers(effort), front_table, *tables_9_and_10(effort)]
     physical: list[tuple[str, AsocRun]] = []
     if effort.physics:
         table, physical = physics(effort)
-        tables.append(table)
+        tables += [table, physics_knowledge(effort)]
     draw(effort, front, design, physical)
-    publish("asoc_tables", tables, packages=PACKAGES, notes=NOTES)
+    notes = (*NOTES, f"The page took {(time.perf_counter() - began) / 60:.1f} minutes.")
+    publish("asoc_tables" if effort is FULL else "asoc_tables_quick", tables, packages=PACKAGES, notes=notes)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ ENGINES = {"pybullet": asoc_in_pybullet, "mujoco": asoc_in_mujoco}
 
 
 def level() -> HeightMap:
-    return HeightMap(np.zeros((40, 30)), 0.25, (-3.0, -3.0))
+    return HeightMap(np.zeros((40, 41)), 0.25, (-3.0, -3.0))
 
 
 def test_masses_add_up_to_65_kg() -> None:
@@ -89,6 +89,13 @@ def test_driven_pivots_run_too(engine) -> None:
     rough = replace(rough_ground(0.015, rng=np.random.default_rng(3), size=6.0), origin=(-2.0, -2.0))
     run = ENGINES[engine](GEOMETRY, rough, planned_speed(square_corners(1.0)), driven_pivots=True)
     assert run.rms < 0.05
+
+
+@pytest.mark.parametrize("engine", list(ENGINES))
+def test_leaving_the_map_is_an_error_with_its_place(engine) -> None:
+    small = HeightMap(np.zeros((9, 9)), 0.25, (-1.0, -1.0))
+    with pytest.raises(SimulationError, match=r"left the height map .* take a larger map"):
+        ENGINES[engine](GEOMETRY, small, planned_speed([[0.0, 0.0], [2.0, 0.0]]))
 
 
 def test_bad_input_is_refused() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.asoc_tables import QUICK, interval, mobility, table_5
+from benchmarks.asoc_tables import mobility, table_5
+from benchmarks.asoc_tables_tracking import QUICK, difference, interval
 from trajopt.errors import ArgumentError
 from trajopt.report.asoc import curve_figure, front_figure, map_figure, speed_figure, tracks_figure
 from trajopt.report.platform_picture import platform_figure
@@ -46,4 +47,6 @@ def test_pages_of_the_benchmark() -> None:
     assert ("bicycle", "1", "1", "2") in mobility().rows
     assert len(table_5().rows) == 8
     assert interval([0.1, 0.2, 0.3]) == "20.00 +- 24.84"
+    assert difference([0.1, 0.1, 0.1], [0.2, 0.2, 0.2]) == ("+10.000 +- 0.000", "smaller")
+    assert difference([0.1, 0.2, 0.3], [0.3, 0.2, 0.1])[1] == "no difference seen"
     assert QUICK.seeds in (3, 10)

@@ -157,7 +157,7 @@ def run_asoc(session: AsocSession, robot: AsocBody, ground: HeightMap, reference
              label: tuple[str, str], knowledge: Knowledge | None = None) -> AsocRun:
     """Settle, then drive along ``reference``; pose and ground are known unless ``knowledge`` says otherwise
     (between updates the pose is that of odometry, from wheel speeds and module angles). Raises
-    SimulationError when the numbers leave physics or the robot tips over."""
+    SimulationError when the numbers leave physics, the robot tips over or leaves the height map."""
     known = knowledge or Knowledge()
     geometry, still = robot.geometry, np.zeros((robot.geometry.modules, 2))
     begun = time.perf_counter()
@@ -169,6 +169,7 @@ def run_asoc(session: AsocSession, robot: AsocBody, ground: HeightMap, reference
     for moment in np.arange(0.0, reference.duration + control / 2, control):
         now = session.state()
         pose, lean = _pose(now, float(moment))
+        _require_ground(pose, robot, ground, float(moment))
         place, velocity = reference.at(float(moment))
         rows.append((pose, lean, now.touch.ravel(), place))
         tilt, slope = still[:, 0], still
@@ -188,6 +189,15 @@ def run_asoc(session: AsocSession, robot: AsocBody, ground: HeightMap, reference
     times = np.asarray(control * np.arange(len(rows)), dtype=np.float64)
     return AsocRun(label[0], label[1], times, pose, lean, touch.astype(bool), wanted,
                    reference.distance(pose[:, :2]), time.perf_counter() - begun)
+
+
+def _require_ground(pose: Array, robot: AsocBody, ground: HeightMap, moment: float) -> None:
+    """SimulationError where the module axes no longer stand over the map: the engines have nothing beyond it."""
+    low = np.array(ground.origin) + robot.geometry.module_radius
+    high = low + np.array(ground.size) - 2 * robot.geometry.module_radius
+    if np.any(pose[:2] < low) or np.any(pose[:2] > high):
+        raise SimulationError(f"the robot left the height map {moment:.3g} s after the start, at "
+                              f"({pose[0]:.3g}, {pose[1]:.3g}) m; take a larger map")
 
 
 def _pose(now: AsocState, moment: float) -> tuple[Array, Array]:
