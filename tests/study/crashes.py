@@ -182,7 +182,7 @@ def torment_slurm(kills: int, count: int, seed: int, folder: Path) -> Outcome:
         open_store(place)
         while len(open_store(place).finished()) < count:
             process = _start("slurm", count, place)
-            if sum(outcome.kills.values()) < kills and draw.random() < 0.3:
+            if sum(outcome.kills.values()) < kills and draw.random() < 0.6:
                 time.sleep(draw.uniform(0.2, 4.0))
                 process.kill()
                 outcome.kills["submitter"] += 1
