@@ -85,12 +85,16 @@ def coordinate_stages(points: int) -> tuple[Stages, Array, Array, Array]:
     path = curve()
     u = np.linspace(path.start, path.end, points)
     q, dq, ddq = (path.position(u, k)[:, :2] for k in range(3))
+    return coordinate_rows(u - u[0], dq, ddq), q, dq, ddq
+
+
+def coordinate_rows(s: Array, dq: Array, ddq: Array) -> Stages:
+    """The rows alone, from q' and q''."""
     limits = np.array(ACCELERATION)
     a, b = np.hstack([dq, -dq]) / np.tile(limits, 2), np.hstack([ddq, -ddq]) / np.tile(limits, 2)
     sd2_max = np.min((np.array(SPEED) / np.maximum(np.abs(dq), 1e-12)) ** 2, axis=1)
     owner = np.zeros(4, dtype=np.intp)
-    return (Stages(u - u[0], a, b, np.ones_like(a), sd2_max, ("coordinates",), owner, sd2_max[None, :], ()),
-            q, dq, ddq)
+    return Stages(s, a, b, np.ones_like(a), sd2_max, ("coordinates",), owner, sd2_max[None, :], ())
 
 
 def best(run: Callable[[], Any], repetitions: int) -> float:
@@ -131,9 +135,11 @@ def coordinates(repetitions: int) -> ResultTable:
     stages, q, dq, ddq = coordinate_stages(POINTS)
     exact = compiled_profile(stages, 0.0, 0.0)
     ours = best(lambda: compiled_profile(stages, 0.0, 0.0), repetitions)
+    rows_too = best(lambda: compiled_profile(coordinate_rows(stages.s, dq, ddq), 0.0, 0.0), repetitions)
     built = best(lambda: compiled_profile(coordinate_stages(POINTS)[0], 0.0, 0.0), repetitions)
     theirs = best(lambda: toppra_profile(stages, 0.0, 0.0), max(3, repetitions // 20))
     rows = [row("compiled", ours, theirs, stages, exact, exact),
+            row("compiled, with building rows", rows_too, theirs, stages, exact, exact),
             row("compiled, with building path samples and rows", built, theirs, stages, exact, exact),
             row("toppra (seidel)", theirs, theirs, stages, toppra_profile(stages, 0.0, 0.0), exact)]
     if importlib.util.find_spec("copp_py"):
