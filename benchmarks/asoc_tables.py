@@ -259,7 +259,7 @@ def draw(effort: Effort, front: ParetoFront, design: AsocDesign, physical: list[
         best = np.array(list(design.describe(full_factorial(design)[0]).values())) / peaks
         save_figure(front_figure(front.terms / peaks, TERMS, best), FIGURES / "pareto.png")
         steering = wheel_steering(GEOMETRY, [0.3, 1.0, -2.0, 0.5])
-        save_figure(platform_figure(asoc_platform(GEOMETRY), steering=steering, twist=[0.5, 0.3, 1.0]),
+        save_figure(platform_figure(asoc_platform(GEOMETRY), steering=steering, twist=[0.6, 0.6, 0.7]),
                     FIGURES / "platform.png")
 
 
