@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 console = Console()
 
 RUN = "run"
+BEST_KNOWN = Path("trajopt") / "study" / "best_known.json"  # in a checkout
 
 
 class _FileFirst(typer.core.TyperGroup):
@@ -67,6 +68,17 @@ def report(store: Annotated[Path, typer.Argument(help="rows of a benchmark (its 
 
     page = write_report(open_store(store, create=False), out or store / "report")
     console.print(f"written to {page}")
+
+
+@app.command("best")
+def best(store: Annotated[Path, typer.Argument(help="rows of a benchmark (its directory)", show_default=False)],
+         file: Annotated[Path, typer.Option("--file", help="JSON file to merge into")] = BEST_KNOWN) -> None:
+    """Keep the best costs of a benchmark, with who found them, in the file of best known values."""
+    from trajopt.study.bench import write_best_known
+    from trajopt.study.store import open_store
+
+    known = write_best_known(open_store(store, create=False), file)
+    console.print(f"{len(known)} problems in {file}")
 
 
 def default_store(bench_file: Path) -> Path:

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import NullFormatter
 from numpy.typing import NDArray
 
 from trajopt.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, in_style, new_figure
-from trajopt.study.bench_tables import GRADIENT_METHODS, SOLVED, BenchTables
-from trajopt.study.profiles import data_profile, ecdf, performance_profile
+from trajopt.study.bench_tables import GRADIENT_METHODS, NEAR, SOLVED, BenchTables, Share
+from trajopt.study.profiles import data_profile, ecdf, holm, performance_profile
 from trajopt.study.store import Store
 
 Array = NDArray[np.float64]
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK, GREY)
 _DASHES = ("-", "--", ":")
+_SMALL_COLOURS = 48  # of a small picture, chosen
+_LEVEL = 0.05  # of significance
+_BUILT_FOR = 5  # searches that share one construction: seeds in a row
+_PEERS = ("pyswarms", "pyswarms-constriction", "pyswarms-equal", "pymoo-pso")
+_SHOWN = ("pso", "pso-gbest", "pso-thesis-enhanced", "pyswarms", "cma-es", "differential-evolution", "hybrid",
+          "lattice", "ipopt", "slsqp", "l-bfgs-b", "least-squares")  # in the small pictures, where they apply
 PROFILE_SHARE = 1e-5  # of reference - best: the accuracy of data and performance profiles; Moré and Wild's tau
 
 
@@ -26,17 +33,16 @@ def write_report(store: Store, out: Path) -> Path:
     """Write index.md, the CSV tables and the figures of a benchmark's rows into ``out``; index.md's path."""
     out.mkdir(parents=True, exist_ok=True)
     tables = BenchTables(store.frame().to_dict("records"))
-    figures = [_ecdf_figure(tables, out), _profile_figure(tables, out)]
-    text = ["# Optimizers compared", "", _where(store, tables), "", "## Answers", ""]
-    text += [f"- {line}" for line in answers(tables)]
-    text += ["", "## Share of searches solved", "", f"Solved: at most {SOLVED:g} of the way from a median random point "
-             "to the best known cost is left. In brackets: median share left; median seconds.", ""]
-    text += _share_table(tables, out)
-    text += ["", "Each curve counts only the problems its optimizer can work on (the lattice needs affine wheel "
+    figures = [_ecdf_figure(tables, out), _profile_figure(tables, out), _family_figure(tables, out)]
+    text = ["# Optimizers compared", "", run_line(store, tables), "", "## Answers", "", *answer_lines(tables), ""]
+    text += ["## Share of searches solved", "", *share_lines(tables, out), ""]
+    text += ["Each curve counts only the problems its optimizer can work on (the lattice needs affine wheel "
              "angles, for example), so compare curves of optimizers with the same problems: the table tells which."]
     for title, file in figures:
         text += ["", f"## {title}", "", f"![{title}]({file})"]
     text += ["", "## Expected running time", "", *_running_table(tables, out)]
+    text += ["", "## Construction", "", *_construction(tables, out)]
+    text += ["", "## PSO against pyswarms", "", *peer_lines(tables)]
     text += ["", "## Best known costs", "", *_markdown(("problem", "best cost", "found by"), [
         (name, f"{cost:.6g}", who) for name, (cost, who) in tables.best.items()])]
     text += ["", "## Searches that failed", "", *_failures(tables)]
@@ -46,81 +52,106 @@ def write_report(store: Store, out: Path) -> Path:
     return page
 
 
-def _where(store: Store, tables: BenchTables) -> str:
+def run_line(store: Store, tables: BenchTables) -> str:
+    """What ran, where, with what, and how long."""
     runs = store.runs()
     last = runs[-1] if runs else {}
     versions = ", ".join(f"{k} {v}" for k, v in dict(last.get("versions", {})).items())
     cpus = ", ".join(sorted({str(row.get("cpu")) for row in tables.done}))
-    return (f"{len(tables.done)} finished searches, {len(tables.rows) - len(tables.done)} others; {cpus}; commit "
-            f"{last.get('commit')}; {versions}. Rows: searches.csv.")
+    spent = sum(float(row["seconds"]) + float(row["construct_seconds"]) / _BUILT_FOR for row in tables.done)
+    seeds = len({row["seed"] for row in tables.rows})
+    return (f"{len(tables.done)} finished searches, {len(tables.rows) - len(tables.done)} others: "
+            f"{len(tables.problems)} problems, {len(tables.optimizers)} optimizers, {seeds} seeds; about "
+            f"{spent / 60:.0f} min of processor time, in {len(runs)} run(s). Seconds are processor time of one "
+            f"thread. {cpus}; commit {str(last.get('commit'))[:7]}; {versions}. Rows: searches.csv.")
 
 
-def answers(tables: BenchTables) -> list[str]:
-    """Where PSO wins, where gradients do, what exactness buys, what to take: one sentence each, from the numbers."""
-    shares, lines = tables.shares(), []
+def answer_lines(tables: BenchTables) -> list[str]:
+    """Where PSO wins, where gradients do, what exactness buys, what to take: Markdown from the numbers."""
+    shares = tables.shares()
+    rows = []
     for family, found in shares.items():
-        swarm = _best_of(found, lambda n: n.startswith("pso"))
-        gradient = _best_of(found, lambda n: n in GRADIENT_METHODS)
-        winner = _best_of(found, lambda _: True)
-        text = f"**{family}**: best is {_told(winner, found)}"
-        if swarm and gradient:
-            side = _compare(found, swarm, gradient)
-            text += f"; {side} (PSO {_told(swarm, found)}, gradients {_told(gradient, found)})"
-        lines.append(text + ".")
-    exact = [family for family, found in shares.items() if "lattice" in found and found["lattice"][0] > 0]
-    if exact:
-        parts = []
-        for family in exact:
-            found = shares[family]
-            other = _best_of(found, lambda n: n not in ("lattice", "ipopt"))
-            if other:
-                parts.append(f"{family}: lattice solves {found['lattice'][0]:.0%} in {found['lattice'][2]:.3g} s, "
-                             f"{other} {found[other][0]:.0%} in {found[other][2]:.3g} s")
-        lines.append("**What exactness buys**: " + "; ".join(parts) + ".")
-    tested = tables.compared("pso", "pyswarms-constriction")
-    if tested:
-        worse = [name for name, *_, p in tested if p < 0.05 / len(tested)]
-        lines.append(f"**Against pyswarms with equal parameters** on {len(tested)} classical functions: PSO is "
-                     f"significantly worse on {len(worse)}{' (' + ', '.join(worse) + ')' if worse else ''} (rank-sum "
-                     "test, 5 %, Bonferroni).")
-    overall = {name: float(np.mean([found[name][0] for found in shares.values() if name in found]))
-               for name in tables.optimizers if any(name in found for found in shares.values())}
-    anywhere = [n for n in overall if all(n in found for found in shares.values())]
-    general = max(anywhere, key=lambda n: overall[n]) if anywhere else ""
-    first = "take lattice where critical wheel angles are affine or nearly so; " if exact else ""
-    lines.append("**Recommendation**: " + first
-                 + (f"where nothing is known of the objective, {general} solved most over all families "
-                    f"({overall[general]:.0%})." if general else "no optimizer ran on every family."))
-    return lines
+        names = [_best_of(found, wanted) for wanted in (
+            lambda _: True, lambda n: n.startswith("pso"), lambda n: n in GRADIENT_METHODS, lambda n: n in _PEERS)]
+        side = _compare(found, names[1], names[2]) if names[1] and names[2] else ""
+        rows.append((family, *(_told(name, found) if name else "none fits" for name in names), side))
+    header = ("family", "best of all", "best PSO", "best gradient method", "best peer's PSO", "PSO or gradients")
+    text = _markdown(header, rows)
+    text += ["", f"In brackets: searches solved (at most {SOLVED:g} of the way from a median random point to the best "
+             "known cost is left), median share left, median seconds."]
+    exact = [(family, found) for family, found in shares.items() if "lattice" in found]
+    parts = []
+    for family, found in exact:
+        other = _best_of(found, lambda n: n not in ("lattice", "ipopt"))
+        if other:
+            parts.append(f"- {family}: {_told('lattice', found)}; best that knows nothing of exactness: "
+                         f"{_told(other, found)}")
+    if parts:
+        text += ["", "What exactness buys:", "", *parts]
+    overall = {name: float(np.mean([found[name].near for found in shares.values()]))
+               for name in tables.optimizers if all(name in found for found in shares.values())}
+    if overall:
+        ranked = sorted(overall, key=lambda n: -overall[n])
+        text += ["", f"Methods that work on every family, by the mean share of searches nearly solved (to {NEAR:g}): "
+                 + ", ".join(f"{name} {overall[name]:.0%}" for name in ranked) + "."]
+    return text
 
 
-def _best_of(found: dict[str, tuple[float, float, float]], wanted: object) -> str:
-    names = [name for name in found if callable(wanted) and wanted(name)]
-    return min(names, key=lambda n: (-found[n][0], found[n][1], found[n][2])) if names else ""
+def _best_of(found: dict[str, Share], wanted: Callable[[str], bool]) -> str:
+    names = [name for name in found if wanted(name)]
+    return min(names, key=lambda n: _rank(found[n])) if names else ""
 
 
-def _told(name: str, found: dict[str, tuple[float, float, float]]) -> str:
-    share, gap, seconds = found[name]
-    return f"{name} ({share:.0%} solved, median left {gap:.1e}, {seconds:.2g} s)"
+def _rank(share: Share) -> tuple[float, ...]:
+    """More solved first; where none is or all are, more nearly solved, less left, less time."""
+    return -share.solved, -share.near, _leading(share.left), share.seconds
 
 
-def _compare(found: dict[str, tuple[float, float, float]], swarm: str, gradient: str) -> str:
-    a, b = found[swarm], found[gradient]
-    if (a[0], -a[1]) == (b[0], -b[1]):
-        return "PSO and gradients tie"
-    return "PSO wins over gradients" if (a[0], -a[1]) > (b[0], -b[1]) else "gradients win over PSO"
+def _leading(left: float) -> float:
+    """Two digits of the share left, at least SOLVED: what is below differs by rounding alone."""
+    return max(float(f"{left:.1e}"), SOLVED) if np.isfinite(left) else left
 
 
-def _share_table(tables: BenchTables, out: Path) -> list[str]:
+def _told(name: str, found: dict[str, Share]) -> str:
+    share = found[name]
+    return f"{name} ({share.solved:.0%}; {share.left:.1e}; {share.seconds:.2g} s)"
+
+
+def _compare(found: dict[str, Share], swarm: str, gradient: str) -> str:
+    a, b = _rank(found[swarm])[:3], _rank(found[gradient])[:3]
+    if a == b:
+        return "tie" if found[swarm].seconds == found[gradient].seconds else (
+            "tie; PSO sooner" if found[swarm].seconds < found[gradient].seconds else "tie; gradients sooner")
+    return "PSO" if a < b else "gradients"
+
+
+def peer_lines(tables: BenchTables) -> list[str]:
+    """PSO beside pyswarms with the same coefficients on the classical functions: rank-sum test, Holm's correction."""
+    text = []
+    for name in ("pso-gbest", "pso"):
+        tested = tables.compared(name, "pyswarms-constriction")
+        if not tested:
+            continue
+        corrected = holm([p for *_, p in tested])
+        rows = [(problem, f"{ours:.3g}", f"{theirs:.3g}", f"{p:.3f}", "yes" if p < _LEVEL else "no")
+                for (problem, ours, theirs, _), p in zip(tested, corrected, strict=True)]
+        header = ("problem", f"{name}, median cost", "pyswarms, same coefficients", "p (Holm)", "significantly worse")
+        text += [*_markdown(header, rows), ""]
+    return text[:-1] or ["Not in this benchmark."]
+
+
+def share_lines(tables: BenchTables, out: Path) -> list[str]:
+    """The table of shares as Markdown, and as shares.csv in ``out``."""
     shares = tables.shares()
     rows = []
     for name in tables.optimizers:
         cells = [shares[f].get(name) for f in shares]
-        rows.append((name, *("" if c is None else f"{c[0]:.0%} ({c[1]:.0e}; {c[2]:.2g} s)" for c in cells)))
-    flat = [(family, name, f"{v[0]:.4f}", f"{v[1]:.6e}", f"{v[2]:.6f}") for family, found in shares.items()
-            for name, v in found.items()]
-    _write_csv(out / "shares.csv", ("family", "optimizer", "solved", "median_left", "median_seconds"), flat)
-    return _markdown(("optimizer", *shares), rows)
+        rows.append((name, *("" if c is None else f"{c.solved:.0%}, {c.near:.0%}, {c.left:.0e}" for c in cells)))
+    flat = [(family, name, f"{v.solved:.4f}", f"{v.near:.4f}", f"{v.left:.6e}", f"{v.seconds:.6f}")
+            for family, found in shares.items() for name, v in found.items()]
+    _write_csv(out / "shares.csv", ("family", "optimizer", "solved", "near", "median_left", "median_seconds"), flat)
+    return [f"Searches solved (to {SOLVED:g}), nearly solved (to {NEAR:g}), and the median share left. Empty: the "
+            "optimizer does not work on this family.", "", *_markdown(("optimizer", *shares), rows)]
 
 
 def _running_table(tables: BenchTables, out: Path) -> list[str]:
@@ -131,6 +162,18 @@ def _running_table(tables: BenchTables, out: Path) -> list[str]:
     reached = [row for row in rows if not row[5].startswith("0/")]
     return [f"Evaluations until {PROFILE_SHARE:g} is left, failures counted (inf where no search got there: "
             "expected_running_time.csv has all rows).", "", *_markdown(header, reached)]
+
+
+def _construction(tables: BenchTables, out: Path) -> list[str]:
+    found = tables.construction()
+    _write_csv(out / "construction.csv", ("family", "optimizer", "median_seconds"),
+               [(family, name, f"{seconds:.6f}") for family, name, seconds in found])
+    families = list(dict.fromkeys(family for family, *_ in found))
+    table = {(family, name): seconds for family, name, seconds in found}
+    rows = [(name, *(f"{table[family, name]:.2g}" if (family, name) in table else "" for family in families))
+            for name in tables.optimizers]
+    return ["Median seconds to load, build and compile before the first search of a process, apart from all other "
+            "figures.", "", *_markdown(("optimizer", *families), rows)]
 
 
 def _failures(tables: BenchTables) -> list[str]:
@@ -189,6 +232,43 @@ def _profile_figure(tables: BenchTables, out: Path) -> tuple[str, str]:
         return f"Data and performance profiles (accuracy {PROFILE_SHARE:g})", _saved(figure, out, "profiles")
 
 
+def _family_figure(tables: BenchTables, out: Path) -> tuple[str, str]:
+    """One small picture a family: share of targets reached over seconds, of the methods people choose between."""
+    with in_style():
+        families = tables.families()
+        figure = new_figure(2.4 * ((len(families) + 3) // 4) + 0.4, 10.0)
+        grid = figure.subplots((len(families) + 3) // 4, min(4, len(families)), squeeze=False).ravel()
+        chosen = [k for k, name in enumerate(tables.optimizers) if name in _SHOWN]
+        times = tables.times("seconds")[:, chosen]
+        for axes, (family, places) in zip(grid, families.items(), strict=False):
+            part = times[places]
+            finite = part[np.isfinite(part) & (part > 0)]
+            axes.set_title(family.replace(", ", "\n", 1), fontsize=8)
+            axes.set_ylim(0.0, 1.02)
+            axes.set_xscale("log")
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            if not finite.size:
+                continue
+            budgets = np.geomspace(finite.min(), finite.max(), 200)
+            curves = ecdf(part, budgets)
+            for i, k in enumerate(chosen):
+                shown = _SHOWN.index(tables.optimizers[k])
+                axes.step(budgets, curves[:, i], color=_COLOURS[shown % 8], ls=_DASHES[shown // 8 % 3],
+                          label=tables.optimizers[k], where="post")
+        for axes in grid[len(families):]:
+            axes.set_axis_off()
+        handles, labels = grid[0].get_legend_handles_labels()
+        for axes in grid[1:]:
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                if label not in labels:
+                    handles.append(handle)
+                    labels.append(label)
+        figure.legend(handles, labels, loc="outside right upper", fontsize=8)
+        figure.supxlabel("seconds of processor time", fontsize=9)
+        figure.supylabel("share of targets reached", fontsize=9)
+        return "Targets reached over time, family by family", _saved(figure, out, "families")
+
+
 def _curves(axes: Axes, tables: BenchTables, times: Array, share: object, scale: float = 1.0) -> None:
     finite = times[np.isfinite(times) & (times > 0)]
     if not finite.size or not callable(share):
@@ -205,6 +285,14 @@ def _saved(figure: object, out: Path, name: str) -> str:
     for kind in ("svg", "png"):
         figure.savefig(out / f"{name}.{kind}", format=kind)  # type: ignore[attr-defined]
     return f"{name}.png"
+
+
+def small_picture(source: Path, target: Path) -> None:
+    """The PNG ``source`` with few colours, for a page in a repository: a third of its size."""
+    from PIL import Image
+
+    with Image.open(source) as picture:
+        picture.convert("RGB").quantize(_SMALL_COLOURS).save(target, optimize=True)
 
 
 def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -7,6 +7,7 @@ themselves: a row's cost and violation are recomputed by the objective at the fi
 
 from __future__ import annotations
 
+import datetime
 import json
 import platform
 import time
@@ -24,7 +25,7 @@ from trajopt.errors import ArgumentError
 from trajopt.optimize.base import FEASIBLE, Budget, Optimizer, OptimizeResult
 from trajopt.optimize.plugins import optimizers_of_file
 from trajopt.optimize.search import minimize, optimizer_named
-from trajopt.study.bench_problems import BenchProblem, bench_problem, more_wild_names, objective_named
+from trajopt.study.bench_problems import BenchProblem, bench_problem, best_known, more_wild_names, objective_named
 from trajopt.study.cases import Case
 from trajopt.study.drive import Progress
 from trajopt.study.store import Store
@@ -222,9 +223,32 @@ def best_costs(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, str]
     for row in rows:
         name = str(row["problem"])
         if name not in best:
-            known = row.get("best")
-            best[name] = (float(known), "best_known.json") if known is not None and np.isfinite(known) else (np.inf, "")
+            known = {"cost": row.get("best"), "found_by": row.get("found_by") or "best_known.json",
+                     **best_known().get(name, {})}
+            told = known["cost"] is not None and np.isfinite(known["cost"])
+            best[name] = (float(known["cost"]), str(known["found_by"])) if told else (np.inf, "")
         cost = row.get("cost")
         if row["status"] == "done" and row.get("feasible") and cost is not None and cost < best[name][0]:
             best[name] = (float(cost), f"{row['optimizer']}, seed {row['seed']}")
     return best
+
+
+def write_best_known(store: Store, file: str | Path) -> dict[str, dict[str, Any]]:
+    """Merge the best rows of a benchmark into ``file`` (best_known.json), where they are better; what it then holds.
+
+    Each entry has the cost, who found it (optimizer, seed, commit, date) and the decision variables.
+    """
+    place = Path(file)
+    known: dict[str, dict[str, Any]] = json.loads(place.read_text(encoding="utf-8")) if place.exists() else {}
+    last = store.runs()[-1]
+    day = datetime.datetime.fromtimestamp(float(last["started"]), datetime.UTC).date().isoformat()
+    where = f"commit {str(last.get('commit'))[:7]}, {day}"
+    for row in store.frame().to_dict("records"):
+        name, cost = str(row["problem"]), row.get("cost")
+        if row["status"] != "done" or not row["feasible"] or cost is None or not np.isfinite(cost):
+            continue
+        if name not in known or cost < known[name]["cost"]:
+            known[name] = {"cost": float(cost), "found_by": f"{row['optimizer']}, seed {int(row['seed'])}, {where}",
+                           "x": json.loads(row["x"])}
+    place.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n", encoding="utf-8")
+    return known

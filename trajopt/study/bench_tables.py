@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,16 +20,30 @@ Row = Mapping[str, Any]
 Unit = Literal["evaluations", "evaluations and gradients", "seconds"]
 
 SOLVED = 1e-6  # share of reference - best left at which a problem counts as solved; chosen
+NEAR = 1e-2  # the same for nearly solved; chosen
 GRADIENT_METHODS = ("ipopt", "slsqp", "l-bfgs-b", "trust-constr", "least-squares")
-FAMILIES = {  # name in the report -> the names of problems that belong to it start and end like this
-    "SMDW, affine (no actuator limits)": ("smdw/", "/p2"),
-    "SMDW, limits, P2 free": ("smdw/", "/p2/limits"),
-    "SMDW, limits, P1, P2 and heading free": ("smdw/", "heading/limits"),
-    "random SMDW goals, limits": ("random-smdw/", "limits"),
-    "ASOC design, constrained": ("asoc/", ""),
-    "classical multimodal, 10-D": ("classical/", ""),
-    "Moré-Wild least squares": ("more-wild/", ""),
+FAMILIES = {  # name in the report -> what the names of its problems look like
+    "SMDW, ideal drives (affine)": r"smdw/[^/]+/[^/]+",
+    "SMDW, limits, points free": r"smdw/[^/]+/(p1|p2|p1\+p2)/limits",
+    "SMDW, limits, points and headings free": r"smdw/[^/]+/.*heading/limits",
+    "random SMDW goals, limits": r"random-smdw/.*",
+    "corridor, least length": r"corridor/\d+/length",
+    "corridor, least time under slip": r"corridor/\d+/duration",
+    "thesis 004 path, least time": r"powerbot/.*",
+    "ASOC design, constrained": r"asoc/.*",
+    "classical, 10-D": r"classical/.*",
+    "Moré-Wild least squares": r"more-wild/.*",
 }
+
+
+class Share(NamedTuple):
+    """How an optimizer did on a family: shares of searches ``solved`` and ``near`` (SOLVED, NEAR), the median share
+    ``left`` and the median ``seconds`` of a search."""
+
+    solved: float
+    near: float
+    left: float
+    seconds: float
 
 
 @dataclass(frozen=True)
@@ -72,8 +87,8 @@ class BenchTables:
         """Positions of the problems of each family; what fits none is listed under its first word."""
         found: dict[str, list[int]] = {name: [] for name in FAMILIES}
         for i, problem in enumerate(self.problems):
-            for name, (start, end) in FAMILIES.items():
-                if problem.startswith(start) and problem.endswith(end):
+            for name, pattern in FAMILIES.items():
+                if re.fullmatch(pattern, problem):
                     found[name].append(i)
                     break
             else:
@@ -116,9 +131,9 @@ class BenchTables:
             used = used * (1.0 + row["dimension"] * (row.get("gradients") or 0) / row["nfev"])
         return time_to_targets(used, row["at_cost"], best + scale * np.asarray(targets))
 
-    def shares(self) -> dict[str, dict[str, tuple[float, float, float]]]:
-        """Family -> optimizer -> share of searches that solved, median gap, median seconds of a search."""
-        found: dict[str, dict[str, tuple[float, float, float]]] = {}
+    def shares(self) -> dict[str, dict[str, Share]]:
+        """Family -> optimizer -> how it did."""
+        found: dict[str, dict[str, Share]] = {}
         for family, places in self.families().items():
             names = {self.problems[i] for i in places}
             found[family] = {}
@@ -127,8 +142,21 @@ class BenchTables:
                 if rows:
                     gaps = np.sort([self.gap(r) for r in rows])
                     seconds = [r["seconds"] for r in rows if r["status"] == "done"]
-                    found[family][optimizer] = (float(np.mean(gaps <= SOLVED)), float(gaps[(len(gaps) - 1) // 2]),
-                                                float(np.median(seconds)) if seconds else float("nan"))
+                    found[family][optimizer] = Share(
+                        float(np.mean(gaps <= SOLVED)), float(np.mean(gaps <= NEAR)), float(gaps[(len(gaps) - 1) // 2]),
+                        float(np.median(seconds)) if seconds else float("nan"))
+        return found
+
+    def construction(self) -> list[tuple[str, str, float]]:
+        """Family, optimizer, median seconds to load, build and compile before a first search (processor time)."""
+        found = []
+        for family, places in self.families().items():
+            names = {self.problems[i] for i in places}
+            for optimizer in self.optimizers:
+                times = [r["construct_seconds"] for r in self.done
+                         if r["problem"] in names and r["optimizer"] == optimizer]
+                if times:
+                    found.append((family, optimizer, float(np.median(times))))
         return found
 
     def running_times(self, share: float = 1e-5) -> list[tuple[str, str, RunningTime]]:

@@ -1,0 +1,51 @@
+"""Bring docs/pso_vs_gradient.md up to date with the rows of a benchmark.
+
+Run as ``python -m benchmarks.pso_vs_gradient_page [STORE]`` after ``trajopt bench benchmarks/pso_vs_gradient.toml``.
+Replaces what stands between the markers of the page (tables) and its three pictures; the words around them are
+written by hand, so read them again. The whole report (CSV, SVG, every table) goes to STORE/report.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from benchmarks.common import ROOT
+from trajopt.report.bench import answer_lines, peer_lines, run_line, share_lines, small_picture, write_report
+from trajopt.study.bench_tables import BenchTables
+from trajopt.study.store import open_store
+
+PAGE = ROOT / "docs" / "pso_vs_gradient.md"
+PICTURES = ("families", "ecdf", "profiles")
+
+
+def main() -> None:
+    """Rewrite the generated parts of the page."""
+    parser = argparse.ArgumentParser(description="Generated parts of docs/pso_vs_gradient.md.")
+    parser.add_argument("store", nargs="?", type=Path, default=ROOT / "out" / "bench" / "pso_vs_gradient")
+    store = open_store(parser.parse_args().store, create=False)
+    report = store.path / "report"
+    write_report(store, report)
+    tables = BenchTables(store.frame().to_dict("records"))
+    parts = {"run": [run_line(store, tables)], "answers": answer_lines(tables), "shares": share_lines(tables, report),
+             "peers": peer_lines(tables)}
+    text = PAGE.read_text(encoding="utf-8")
+    for name, lines in parts.items():
+        text = replaced(text, name, "\n".join(lines))
+    PAGE.write_text(text, encoding="utf-8")
+    for name in PICTURES:
+        small_picture(report / f"{name}.png", PAGE.parent / "pictures" / f"pso_vs_gradient_{name}.png")
+
+
+def replaced(text: str, name: str, new: str) -> str:
+    """``text`` with ``new`` between the markers called ``name``."""
+    begin, end = f"<!-- {name}: generated -->\n", f"\n<!-- {name}: end -->"
+    before, found, rest = text.partition(begin)
+    _, closed, after = rest.partition(end)
+    if not found or not closed:
+        raise SystemExit(f"{PAGE}: the markers of '{name}' are missing")
+    return before + begin + new + end + after
+
+
+if __name__ == "__main__":
+    main()
