@@ -24,7 +24,7 @@ from tests.study.same_table import swept
 from trajopt.errors import ArgumentError
 from trajopt.study.cases import Case
 from trajopt.study.drive import Progress, WorkerStartError
-from trajopt.study.engines import Engine
+from trajopt.study.engines import Engine, dask_local
 from trajopt.study.host import RunLoadError
 from trajopt.study.store import StoreError, open_store
 from trajopt.study.sweeps import sweep
@@ -53,6 +53,18 @@ def test_the_same_table_on_dask(tmp_path: Path) -> None:
     stores = [swept(engine, 2000, tmp_path) for engine in ("one", "two", "dask")]
     assert len({digest(store) for store in stores}) == 1
     assert all(len(store.parts()) > 5 for store in stores)
+
+
+@pytest.mark.slow
+def test_dask_listens_on_loopback_only() -> None:
+    pytest.importorskip("distributed", reason="Dask distributed is not installed")
+    psutil = pytest.importorskip("psutil")
+    with dask_local(1).start() as executor:
+        executor.submit(abs, -1).result()
+        me = psutil.Process()
+        found = {connection.laddr.ip for process in (me, *me.children(recursive=True))
+                 for connection in process.net_connections(kind="inet") if connection.status == psutil.CONN_LISTEN}
+    assert found == {"127.0.0.1"}
 
 
 @pytest.mark.slow

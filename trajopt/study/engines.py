@@ -82,7 +82,9 @@ def dask_local(workers: int, *, host: str = LOOPBACK, dashboard: str | None = No
         # Memory is limited case by case; a worker that Dask ends for its memory would cost a whole chunk.
         with (_tries_once(), distributed.LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, host=host, memory_limit=0, silence_logs=40,
-                dashboard_address=dashboard, worker_dashboard_address=dashboard and f"{host}:0") as cluster,
+                dashboard_address=dashboard, worker_dashboard_address=dashboard and f"{host}:0",
+                # Without a dashboard the scheduler still answers HTTP: on any free port, not on a fixed one.
+                scheduler_kwargs={} if dashboard else {"dashboard_address": f"{host}:0"}) as cluster,
               distributed.Client(cluster) as client):
             # Dask drops a worker that is down, even if only for a restart, some seconds after any death of it.
             cluster.adapt(minimum=workers, maximum=workers, interval="1s")
@@ -124,7 +126,7 @@ def dask_slurm(jobs: int, *, memory: str = "2GB", walltime: str = "01:00:00", ho
         with _tries_once(), SLURMCluster(
                 cores=1, processes=1, memory=memory, walltime=walltime, queue=queue, log_directory=directory,
                 local_directory=directory, job_script_prologue=prologue,
-                scheduler_options={"host": host, "dashboard": False},
+                scheduler_options={"host": host, "dashboard": False, "dashboard_address": f"{host}:0"},
                 worker_extra_args=["--host", host, "--no-dashboard"]) as cluster:
             cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs, interval="2s")
             with distributed.Client(cluster) as client:
