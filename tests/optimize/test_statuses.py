@@ -88,10 +88,6 @@ def smooth(x: np.ndarray) -> float:
     return float(np.sum((x - 0.3) ** 2))
 
 
-def kinked(x: np.ndarray) -> float:
-    return float(np.sum(np.abs(x - 0.3)) + 10 * abs(x[0] - 2 * x[1]))
-
-
 @pytest.mark.parametrize("method", ["SLSQP", "L-BFGS-B", "Nelder-Mead", "trust-constr"])
 def test_scipys_flag_decides(method: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from scipy import optimize
@@ -112,17 +108,6 @@ def test_scipys_flag_decides(method: Any, monkeypatch: pytest.MonkeyPatch) -> No
     assert not stalled.success
     assert "0 of 2 starts converged" in stalled.message
     assert "line search failed" in stalled.message
-
-
-def test_slsqp_at_a_kink_does_not_claim_convergence() -> None:
-    from scipy import optimize
-
-    start = [0.1, 2.0]  # from here SLSQP's line search fails at the kink
-    flag = optimize.minimize(kinked, start, method="SLSQP", bounds=optimize.Bounds(*BOX.T), tol=1e-12).success
-    found = minimize(kinked, BOX, optimizer=ScipyLocal("SLSQP", starts=1), x0=start, budget=Budget(20_000))
-    assert not flag
-    assert found.status is Status.STALLED
-    assert not found.success
 
 
 def test_the_start_that_found_the_best_decides() -> None:

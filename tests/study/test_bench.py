@@ -185,3 +185,32 @@ def test_best_costs_take_known_and_found_values() -> None:
     assert best_costs([row(2.0, 0.5)])["a"] == (0.5, "best_known.json")
     with pytest.raises(ArgumentError, match="finished"):
         BenchTables([{**row(1.0, NAN), "status": "error"}])
+
+
+def test_best_known_values_are_kept_with_who_found_them(tmp_path: Path) -> None:
+    import json
+
+    from trajopt.study.bench import write_best_known
+
+    plan = BenchPlan("best", ("smdw/scenario_1_lateral/p2/limits",), ("pso",), seeds=2, evaluations=300)
+    store = run_bench(plan, tmp_path / "rows")
+    file = tmp_path / "best.json"
+    known = write_best_known(store, file)["smdw/scenario_1_lateral/p2/limits"]
+    assert known["cost"] == store.frame().cost.min()
+    assert known["found_by"].startswith("pso, seed ")
+    objective = bench_problem("smdw/scenario_1_lateral/p2/limits").objective
+    assert objective.score(np.array(known["x"])).cost[0] == known["cost"]
+    file.write_text(json.dumps({"smdw/scenario_1_lateral/p2/limits": {"cost": -1.0, "found_by": "someone", "x": []}}))
+    assert write_best_known(store, file)["smdw/scenario_1_lateral/p2/limits"]["found_by"] == "someone"
+
+
+def test_other_seconds_for_costly_problems(tmp_path: Path) -> None:
+    file = tmp_path / "b.toml"
+    text = 'problems = ["corridor/1/duration", "classical/ackley-2"]\noptimizers = ["pso"]\nseeds = 1\nseconds = 0.1\n'
+    file.write_text(text + '[longer]\n"corridor/" = 0.6\n')
+    frame = run_bench(load_bench(file), tmp_path / "rows").frame().set_index("problem")
+    assert 0.6 <= frame.seconds["corridor/1/duration"] < 0.9
+    assert frame.seconds["classical/ackley-2"] < 0.3
+    file.write_text(text + '[longer]\n"corridor/" = -1\n')
+    with pytest.raises(ArgumentError, match="longer"):
+        load_bench(file)

@@ -174,6 +174,8 @@ class RouteObjective:
         depth = self._depth(p[:, :1], p[:, 1:2], 0.0)
         if self.kind == "length":
             return Evaluation(np.array([path.length]), depth)
+        if not path.length > 0:
+            return Evaluation(np.full(1, np.inf), np.full(1, np.inf))
         try:
             return Evaluation(np.array([time_scale(path, self.limits, robot=self.robot).duration]), depth)
         except InfeasibleError:
