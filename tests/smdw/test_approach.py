@@ -1,6 +1,7 @@
 """The controller without physics: odometry, filter, and re-solved paths against their definitions."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +117,20 @@ def test_bends_leave_the_present_speed_as_it_is(plan: Plan) -> None:
     new = resolved(reference, 1.0, reference.at(1.0)[1], angles + np.array([0.2, 0.0, -0.2, 0.0]), goal, ROBOT)
     assert np.abs((new.wheels[-1] - goal.wheels)[list(goal.critical)]).max() < 0.02
     assert np.abs(new.wheels_at(1.001)[1] - speeds).max() < 0.05 * np.abs(speeds).max()
+
+
+def test_a_doubtful_estimate_chases_phase_less_and_a_path_too_short_for_it_keeps_the_pose(plan: Plan) -> None:
+    reference = reference_of(plan.trajectory, np.zeros(4))
+    goal = Goal(reference.pose[-1], reference.wheels[-1], critical(plan), 30.0)
+    pose, wheels = reference.at(2.5)[1], reference.wheels_at(2.5)[0] + np.array([0.1, 0.0, -0.1, 0.0])
+    sure, unsure = (resolved(reference, 2.5, pose, wheels, goal, ROBOT, doubt=d) for d in (0.0, 0.2))
+    missed = [np.abs((r.wheels[-1] - goal.wheels)[list(goal.critical)]).max() for r in (sure, unsure)]
+    assert missed[0] < missed[1]
+    late = plan.duration - 0.12
+    hopeless = reference.wheels_at(late)[0] + np.array([2.0, 0.0, -2.0, 0.0])
+    kept = resolved(reference, late, reference.at(late)[1], hopeless, replace(goal, cap=4.0), ROBOT)
+    assert kept.pose[-1] == pytest.approx(goal.pose, abs=1e-9)
+    assert kept.times[-1] == pytest.approx(reference.times[-1], abs=1e-9)
 
 
 def test_an_error_at_rest_is_shared_between_pose_and_phase_on_the_spot(plan: Plan) -> None:

@@ -4,9 +4,9 @@ Wheel angles at the end depend on the shape of the path, so a deviation of pose 
 bending what remains: p_new(sigma) = p_ref + e (1 - sigma) + g sigma + b(sigma) q + sigma f, with e the deviation
 now, g what the reference misses at its end, and q, f chosen by two Gauss-Newton steps so that the critical wheels
 end at their angles. b = 6.75 sigma^2 (1 - sigma) leaves the present speed as it is: a parabola's jump of speed made
-the wheels slip, and the estimate with them. At rest, what is left is shared between pose and phase by small moves
-on the spot. Between re-solves a servo holds the wheels on the reference. The pose comes from wheel encoders and a
-sparse pose measurement through an extended Kalman filter.
+the wheels slip, and the estimate with them. Phase is chased only as far as the estimate can be trusted. At rest,
+what is left is shared between pose and phase by small moves on the spot. Between re-solves a servo holds the wheels
+on the reference. The pose comes from wheel encoders and a sparse pose measurement through an extended Kalman filter.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ LAST_RESOLVE = 0.05  # s before the end from which on the reference stays, chose
 # robot ended 3-4 mm off
 SERVO_GAIN = 10.0  # 1/s, of the wheel position servo
 WHEEL_WEIGHT = 0.015  # rad, residual of a critical wheel that counts 1
-BEND_WEIGHT = 0.15  # of the remaining length (m), and of the smaller of 1 rad and L/0.5 m: bend that counts 1; measured
+BEND_WEIGHT = 0.1  # of the remaining length (m), and of the smaller of 1 rad and L/0.5 m: bend that counts 1
 # Pose given up at the end that counts 1 (m, m, rad), chosen: with the prototype's four times as much the last part of
 # the path, which can no longer turn the wheels, gives up 4 mm for phase that is within its tolerance anyway.
 END_WEIGHT = (0.001, 0.001, math.radians(0.1))
@@ -141,10 +141,11 @@ class Goal:
 
 
 def resolved(reference: Reference, t: float, estimate: Array, wheels: Array, goal: Goal, robot: Platform,
-             *, phase: bool = True) -> Reference:
+             *, phase: bool = True, doubt: float = 0.0) -> Reference:
     """The reference from ``t`` (s) on, bent so that it starts at the estimate (3,) and ends at the goal.
 
-    ``wheels`` (W,) are the measured angles. Without ``phase`` only the pose is brought to the goal.
+    ``wheels`` (W,) are the measured angles. Without ``phase`` only the pose is brought to the goal. ``doubt`` (rad):
+    standard deviation of the wheel angles that the estimate's uncertainty amounts to; nothing below it is chased.
     """
     now, here = reference.at(t)
     ahead = reference.times > t + 1e-9
@@ -153,11 +154,17 @@ def resolved(reference: Reference, t: float, estimate: Array, wheels: Array, goa
     base = np.vstack([here, reference.pose[ahead]])
     sigma = ((progress - now) / (progress[-1] - now))[:, None]
     base = base + (estimate - here) * (1 - sigma) + (goal.pose - reference.pose[-1]) * sigma
-    bend = _solve_bend(base, sigma, wheels, goal, robot) if phase else np.zeros(6)
-    pose = _bent(base, sigma, bend)
+    pose = _bent(base, sigma, _solve_bend(base, sigma, wheels, goal, robot, doubt)) if phase else base
     angles = wheels + wheel_path(robot, pose)
-    fastest = float(np.max(np.abs(np.diff(angles, axis=0)) / np.diff(times)[:, None]))
+    if phase and _fastest(angles, times) > goal.cap:  # what is left is too short for the phase: it would slip
+        pose, angles = base, wheels + wheel_path(robot, base)
+    fastest = _fastest(angles, times)
     return Reference(t + (times - t) * max(1.0, fastest / goal.cap), progress, pose, angles)
+
+
+def _fastest(angles: Array, times: Array) -> float:
+    """Largest wheel speed, rad/s."""
+    return float(np.max(np.abs(np.diff(angles, axis=0)) / np.diff(times)[:, None]))
 
 
 def _on_the_spot(goal: Goal, t: float) -> Reference:
@@ -174,16 +181,16 @@ def _bent(base: Array, sigma: Array, z: Array) -> Array:
     return np.asarray(base + BUMP * sigma**2 * (1 - sigma) * z[..., :3] + sigma * z[..., 3:])
 
 
-def _solve_bend(base: Array, sigma: Array, wheels: Array, goal: Goal, robot: Platform) -> Array:
+def _solve_bend(base: Array, sigma: Array, wheels: Array, goal: Goal, robot: Platform, doubt: float) -> Array:
     """(6,): two Gauss-Newton steps on weighted wheel errors and bends."""
     length = max(float(np.sum(np.hypot(*np.diff(base[:, :2], axis=0).T))), 1e-3)
     swing = BEND_WEIGHT * min(1.0, length / 0.5)
     weights = 1.0 / np.array([BEND_WEIGHT * length, BEND_WEIGHT * length, swing, *END_WEIGHT])
-    critical = list(goal.critical)
+    critical, scale = list(goal.critical), math.hypot(WHEEL_WEIGHT, doubt)
 
     def residuals(z: Array) -> Array:
         end = wheels + wheel_path(robot, _bent(base, sigma, z))[..., -1, :]
-        return np.concatenate([(end - goal.wheels)[..., critical] / WHEEL_WEIGHT, z * weights], axis=-1)
+        return np.concatenate([(end - goal.wheels)[..., critical] / scale, z * weights], axis=-1)
 
     z = np.zeros(6)
     for _ in range(2):
@@ -230,8 +237,10 @@ class ApproachController:
             self._next_measurement += s.period
         left = self.reference.times[-1] - t
         if self.mode != "open loop" and t >= self._next_solve - 1e-9 and left > LAST_RESOLVE:
+            place = math.sqrt(float(np.trace(self.estimate.covariance[:2, :2])) / 2)  # m, standard deviation
+            doubt = place * float(np.abs(self.robot.inverse[:, 0]).max())
             self.reference = resolved(self.reference, t, self.estimate.pose, wheels, self.goal, self.robot,
-                                      phase=self.mode == "pose and phase")
+                                      phase=self.mode == "pose and phase", doubt=doubt)
             self._next_solve += RESOLVE_EVERY
         if self.mode != "open loop" and left <= -TOUCH_UP_AFTER and self._touch_ups < TOUCH_UPS:
             self._touch_up(t, wheels)
