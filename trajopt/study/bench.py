@@ -247,7 +247,8 @@ def write_best_known(store: Store, file: str | Path) -> dict[str, dict[str, Any]
         name, cost = str(row["problem"]), row.get("cost")
         if row["status"] != "done" or not row["feasible"] or cost is None or not np.isfinite(cost):
             continue
-        if name not in known or cost < known[name]["cost"]:
+        told = row["best"] if row.get("best") is not None and np.isfinite(row["best"]) else np.inf  # elsewhere
+        if cost < min(told, known.get(name, {}).get("cost", np.inf)):
             known[name] = {"cost": float(cost), "found_by": f"{row['optimizer']}, seed {int(row['seed'])}, {where}",
                            "x": json.loads(row["x"])}
     place.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n", encoding="utf-8")
