@@ -60,7 +60,8 @@ def run_line(store: Store, tables: BenchTables) -> str:
     cpus = ", ".join(sorted({str(row.get("cpu")) for row in tables.done}))
     spent = sum(float(row["seconds"]) + float(row["construct_seconds"]) / _BUILT_FOR for row in tables.done)
     seeds = len({row["seed"] for row in tables.rows})
-    return (f"{len(tables.done)} finished searches, {len(tables.rows) - len(tables.done)} others: "
+    planned = f" of {int(last['cases'])} planned" if "cases" in last else ""
+    return (f"{len(tables.done)} finished searches{planned}, {len(tables.rows) - len(tables.done)} others: "
             f"{len(tables.problems)} problems, {len(tables.optimizers)} optimizers, {seeds} seeds; about "
             f"{spent / 60:.0f} min of processor time, in {len(runs)} run(s). Seconds are processor time of one "
             f"thread. {cpus}; commit {str(last.get('commit'))[:7]}; {versions}. Rows: searches.csv.")
@@ -103,8 +104,8 @@ def _best_of(found: dict[str, Share], wanted: Callable[[str], bool]) -> str:
 
 
 def _rank(share: Share) -> tuple[float, ...]:
-    """More solved first; where none is or all are, more nearly solved, less left, less time."""
-    return -share.solved, -share.near, _leading(share.left), share.seconds
+    """Less left in the median search first, then more solved, more nearly solved, less time."""
+    return _leading(share.left), -share.solved, -share.near, share.seconds
 
 
 def _leading(left: float) -> float:
@@ -243,7 +244,7 @@ def _family_figure(tables: BenchTables, out: Path) -> tuple[str, str]:
         for axes, (family, places) in zip(grid, families.items(), strict=False):
             part = times[places]
             finite = part[np.isfinite(part) & (part > 0)]
-            axes.set_title(family.replace(", ", "\n", 1), fontsize=8)
+            axes.set_title(family.replace(", ", "\n"), fontsize=8)
             axes.set_ylim(0.0, 1.02)
             axes.set_xscale("log")
             axes.xaxis.set_minor_formatter(NullFormatter())
