@@ -83,14 +83,20 @@ class Crowd:
         return shift if gap > 0.01 else np.zeros(2)
 
 
-def encounters(where: Course, seeds: range) -> None:
-    for seed in seeds:
-        rng = np.random.default_rng(seed)
+def sensor_for(where: Course, rng: np.random.Generator) -> Sensor:
+    """Drawn anew until the robot may drive at all: with too short a range the safe speed is next to nothing."""
+    while True:
         sensor = Sensor(reach=rng.uniform(0.6, 3.0), scan_time=rng.choice([0.1, 0.26, 0.5]),
                         reaction_time=rng.choice([0.0, 0.1, 0.5]), unseen_speed=rng.uniform(0.0, 0.35))
         if safe_speed(sensor.reach, sensor.scan_time + sensor.reaction_time, float(where.braking.min()),
-                      obstacle_speed=sensor.unseen_speed) < 0.05:
-            continue
+                      obstacle_speed=sensor.unseen_speed) >= 0.05:
+            return sensor
+
+
+def encounters(where: Course, seeds: range) -> None:
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        sensor = sensor_for(where, rng)
         run = run_encounter(where, sensor, Crowd(where, sensor, rng), longest=300.0)
         assert not run.hit, seed
         assert run.kept, seed
