@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all check format schema pictures clean
+.PHONY: help demo test test-all test-slurm check format schema pictures clean
 
 help:  ## what the targets do
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /  -  /'
@@ -30,6 +30,9 @@ test: $(READY)  ## the tests (under 12 minutes on two cores)
 test-all: $(READY)  ## the tests, long ones included
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
+test-slurm: $(READY)  ## sweeps on a real Slurm of one node, which it installs (Debian, as root), starts and stops
+	tests/slurm/ci.sh $(BIN)/python
+
 check: $(READY)  ## ruff, mypy and the import order
 	$(BIN)/ruff check .
 	$(BIN)/mypy
@@ -38,7 +41,7 @@ check: $(READY)  ## ruff, mypy and the import order
 schema: $(READY)  ## rewrite the JSON schema of problem files
 	$(BIN)/trajopt schema --out problems/problem.schema.json
 
-pictures: $(READY)  ## rewrite the pictures that README.md shows
+pictures: $(READY)  ## rewrite the pictures of README.md (the climb study's: after its sweep, see benchmarks/readme_pictures.py)
 	$(BIN)/python -m benchmarks.readme_pictures
 
 clean:  ## remove everything that can be made again
