@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import mmap
 import os
 import resource
 import signal
@@ -23,6 +24,7 @@ from tests.study.run_functions import cheap, mixed, noop, paced, poisoned
 from tests.study.same_table import swept
 from trajopt.errors import ArgumentError
 from trajopt.study.cases import Case
+from trajopt.study.child import PROGRESS, note_progress, noted_progress
 from trajopt.study.drive import Progress, WorkerStartError
 from trajopt.study.engines import Engine, dask_local
 from trajopt.study.host import RunLoadError
@@ -244,3 +246,31 @@ def test_an_engine_that_fails_a_few_starts_is_tried_again(tmp_path: Path) -> Non
     with pytest.raises(WorkerStartError, match="shaky: workers died at 2 starts in a row"):
         sweep(cases(20), cheap, executor=Engine("shaky", start, 1, starts=2), store=store)
     assert store.counts() == {"done": 10}
+
+
+_WRITER = """
+import mmap, sys, time
+from trajopt.study.child import note_progress
+with open(sys.argv[1], "r+b") as file:
+    progress = mmap.mmap(file.fileno(), 16)
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        note_progress(progress, 3)
+        note_progress(progress, -1)
+"""
+
+
+def test_progress_is_never_read_half_written(tmp_path: Path) -> None:
+    """A start time of zero would be a case that runs since the machine was started, and would be ended for it."""
+    file = tmp_path / "progress"
+    file.write_bytes(bytes(PROGRESS.size))
+    with file.open("r+b") as stream:
+        progress = mmap.mmap(stream.fileno(), PROGRESS.size)
+        note_progress(progress, -1)
+        with subprocess.Popen([sys.executable, "-c", _WRITER, str(file)]) as writer:
+            while writer.poll() is None:
+                for _ in range(2000):
+                    index, started = noted_progress(progress)
+                    assert index in (-1, 3)
+                    assert abs(time.monotonic() - started) < 5.0
+        assert writer.returncode == 0

@@ -26,7 +26,9 @@ from trajopt.study.cases import Case
 from trajopt.study.rows import DONE, ERROR, Row, results_of
 from trajopt.study.runfunction import RunFunction, unpacked
 
-PROGRESS = struct.Struct("<qd")  # index of the case in work (-1: none), monotonic time it started at, s
+# Monotonic time at which the case in work started (s), then its index (-1: none). The time comes first: the host may
+# read while both change, and an old index with a new time harms nobody.
+PROGRESS = struct.Struct("<dq")
 _FLUSH_INTERVAL = 0.05  # s between messages to the host: what a crash makes run again; chosen
 _PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
 _TRACEBACK_LINES = 40  # chosen
@@ -69,12 +71,23 @@ def main(connection_handle: int, progress_handle: int, parent: int, memory_limit
             now = time.monotonic()
             if now - sent > _FLUSH_INTERVAL:
                 rows, sent = _sent(connection, rows), now
-            PROGRESS.pack_into(progress, 0, index, now)
+            note_progress(progress, index)
             rows.append(_row(run, index, Case(identity, values)))
-        # Not zero: the host may read while the next case is half written, and must see a time near its own.
-        PROGRESS.pack_into(progress, 0, -1, time.monotonic())
+        note_progress(progress, -1)
         _sent(connection, rows)
         connection.send(("finished",))
+
+
+def note_progress(progress: mmap.mmap, index: int) -> None:
+    """Say that case ``index`` (-1: none) starts now. One copy: ``pack_into`` would write zeros first, which the host
+    could read as a case that has been running since the machine was started."""
+    progress[:] = PROGRESS.pack(time.monotonic(), index)
+
+
+def noted_progress(progress: mmap.mmap) -> tuple[int, float]:
+    """Index of the case in work (-1: none) and the monotonic time it started at, s."""
+    started, index = PROGRESS.unpack(progress[:])
+    return index, started
 
 
 def _row(run: RunFunction, index: int, case: Case) -> Row:

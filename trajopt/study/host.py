@@ -27,7 +27,7 @@ from typing import Any
 
 from trajopt.errors import TrajoptError
 from trajopt.study.cases import CaseTable
-from trajopt.study.child import PROGRESS, THREAD_VARIABLES
+from trajopt.study.child import PROGRESS, THREAD_VARIABLES, note_progress, noted_progress
 from trajopt.study.rows import (
     CRASHED,
     TIMEOUT,
@@ -173,9 +173,9 @@ class _Child:
         self.connection: Connection[Any, Any] = ours
         self.output = b""
         self.shared = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the child
-        self.shared.write(PROGRESS.pack(-1, time.monotonic()))  # as in ``child``: never far from now
-        self.shared.flush()
+        self.shared.truncate(PROGRESS.size)
         self.progress = mmap.mmap(self.shared.fileno(), PROGRESS.size)
+        note_progress(self.progress, -1)
         handles = (theirs.fileno(), self.shared.fileno())
         program = (f"import sys; sys.path[:] = {list(run.path)!r}; from trajopt.study.child import main; "
                    f"main({handles[0]}, {handles[1]}, {os.getpid()}, {memory})")
@@ -204,7 +204,7 @@ class _Child:
         except (EOFError, OSError):
             return self._death()
         except _Overdue as error:
-            index, started = PROGRESS.unpack_from(self.progress)
+            index, started = noted_progress(self.progress)
             self.close()
             return _Death(index, TIMEOUT, "TimeLimit", str(error), self._text(), time.monotonic() - started)
 
@@ -227,14 +227,14 @@ class _Child:
                     self.output = (self.output + data)[-_TAIL:]
                     if not data:
                         sources.remove(source)
-            index, started = PROGRESS.unpack_from(self.progress)
+            index, started = noted_progress(self.progress)
             if index >= 0 and time.monotonic() - started > limit:
                 raise _Overdue(f"longer than the limit of {limit:g} s")
             if should_stop():
                 return False
 
     def _death(self) -> _Death:
-        index, started = PROGRESS.unpack_from(self.progress)
+        index, started = noted_progress(self.progress)
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(2.0)
         code = self.process.poll()
