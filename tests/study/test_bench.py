@@ -192,16 +192,16 @@ def test_best_known_values_are_kept_with_who_found_them(tmp_path: Path) -> None:
 
     from trajopt.study.bench import write_best_known
 
-    plan = BenchPlan("best", ("smdw/scenario_1_lateral/p2/limits",), ("pso",), seeds=2, evaluations=300)
+    plan = BenchPlan("best", ("random-smdw/7/p2/limits",), ("pso",), seeds=2, evaluations=300)
     store = run_bench(plan, tmp_path / "rows")
     file = tmp_path / "best.json"
-    known = write_best_known(store, file)["smdw/scenario_1_lateral/p2/limits"]
+    known = write_best_known(store, file)["random-smdw/7/p2/limits"]
     assert known["cost"] == store.frame().cost.min()
     assert known["found_by"].startswith("pso, seed ")
-    objective = bench_problem("smdw/scenario_1_lateral/p2/limits").objective
+    objective = bench_problem("random-smdw/7/p2/limits").objective
     assert objective.score(np.array(known["x"])).cost[0] == known["cost"]
-    file.write_text(json.dumps({"smdw/scenario_1_lateral/p2/limits": {"cost": -1.0, "found_by": "someone", "x": []}}))
-    assert write_best_known(store, file)["smdw/scenario_1_lateral/p2/limits"]["found_by"] == "someone"
+    file.write_text(json.dumps({"random-smdw/7/p2/limits": {"cost": -1.0, "found_by": "someone", "x": []}}))
+    assert write_best_known(store, file)["random-smdw/7/p2/limits"]["found_by"] == "someone"
 
 
 def test_other_seconds_for_costly_problems(tmp_path: Path) -> None:

@@ -67,7 +67,7 @@ def report(store: Annotated[Path, typer.Argument(help="rows of a benchmark (its 
     from trajopt.study.store import open_store
 
     page = write_report(open_store(store, create=False), out or store / "report")
-    console.print(f"written to {page}")
+    console.print(f"written to {page}", highlight=False, soft_wrap=True)
 
 
 @app.command("best")

@@ -52,6 +52,6 @@ def plan(problem: ProblemFile, set_: Overrides = None,
                 save_pictures(solution, folder)
         if pictures:
             save_maneuver_pictures(found, out)
-        console.print(f"written to {out}", highlight=False)
+        console.print(f"written to {out}", highlight=False, soft_wrap=True)
     if not found.plans:
         raise typer.Exit(FAULTY)

@@ -52,7 +52,7 @@ def export(plan: Plan, out: Annotated[Path, typer.Option(help="CSV file to write
         raise ArgumentError("--rule", rule, "mean or held")
     orders = commands(_timed(plan, set_, "auto"), sample_time, rule="mean" if rule == "mean" else "held")
     export_commands(orders, out)
-    console.print(f"wrote {len(orders.times)} commands to {out}", highlight=False)
+    console.print(f"wrote {len(orders.times)} commands to {out}", highlight=False, soft_wrap=True)
 
 
 def compare(plan: Plan, log: Annotated[Path, typer.Argument(help="CSV with columns t, x, y, yaw, v")],

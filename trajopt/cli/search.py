@@ -73,7 +73,7 @@ def validate(folder: Annotated[Path, typer.Argument(help="folder written by solv
         from trajopt.report.pictures import save_physics_picture
 
         save_physics_picture(solution, report, folder)
-    console.print(f"written to {folder}")
+    console.print(f"written to {folder}", highlight=False, soft_wrap=True)
 
 
 def schema(out: Annotated[Path | None, typer.Option(help="file to write; standard output without it")] = None) -> None:
@@ -94,7 +94,7 @@ def _write(solution: Solution, out: Path, seed: int, pictures: bool) -> None:
         from trajopt.report.pictures import save_pictures
 
         save_pictures(solution, out)
-    console.print(f"written to {out}")
+    console.print(f"written to {out}", highlight=False, soft_wrap=True)
 
 
 def _of_plugin(optimizer: str, plugin: Path | None) -> str:

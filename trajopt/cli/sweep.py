@@ -152,7 +152,7 @@ def report(source: Annotated[Path, typer.Argument(help="sweep file (*.toml), the
         place = source if plan is None else store or _default_store(source)
         files = report_case(open_store(place, create=False), case, out or Path("out") / "report" / case, plan)
     for file in files:
-        console.print(f"wrote {file}", highlight=False)
+        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
 
 
 @app.command()
@@ -181,7 +181,7 @@ def export(store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.c
             pq.write_table(place.table(), out)
         case _:
             raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
-    console.print(f"written to {out}")
+    console.print(f"written to {out}", highlight=False, soft_wrap=True)
 
 
 @app.command()
@@ -196,7 +196,7 @@ def plot(store: StorePath, out: Annotated[Path, typer.Argument(help="picture to 
     from trajopt.report.sweeps import draw
 
     draw(store, out, value=value, x=x, y=y, by=by, pair=pair)
-    console.print(f"written to {out}")
+    console.print(f"written to {out}", highlight=False, soft_wrap=True)
 
 
 def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> None:
