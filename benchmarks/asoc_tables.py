@@ -67,7 +67,7 @@ BASELINE = (0.15, 0.20, 0.15, 0.03)  # m, Table VI: offset, split, radius, width
 
 def mean(places: Array, ratio: float, effort: Effort, **options: object) -> float:
     found = mean_isotropy(places, ratio, rng=np.random.default_rng(0), points=effort.points, shifts=4,
-                          **options)  # type: ignore[arg-type]
+                          **options)  # type: ignore[arg-type]  # options of several types
     return found.value
 
 

@@ -195,7 +195,7 @@ def whole_call(repetitions: int) -> ResultTable:
     rows = []
     for engine in ("compiled", "toppra"):
         result = time_scale(curve(), limits, robot=robot(), engine=engine)
-        seconds = best(lambda name=engine: time_scale(curve(), limits, robot=robot(), engine=name),  # type: ignore[misc]
+        seconds = best(lambda name=engine: time_scale(curve(), limits, robot=robot(), engine=name),  # type: ignore[misc]  # mypy infers no lambda default
                        repetitions if engine == "compiled" else 2)
         rows.append([engine, f"{seconds * 1e3:.0f}", str(len(result.s)), f"{result.duration:.6f}",
                      f"{result.slowdown - 1:.1e}", f"{min(result.margins().values()):.1e}"])
@@ -209,11 +209,11 @@ def growth(quick: bool) -> tuple[ResultTable, str]:
     sizes = [points for points in SIZES if points <= (10_000 if quick else SIZES[-1])]
     for points in sizes:
         stages = force_stages(points)
-        seconds = best(lambda stages=stages: compiled_profile(stages, 0.0, 0.0),  # type: ignore[misc]
+        seconds = best(lambda stages=stages: compiled_profile(stages, 0.0, 0.0),  # type: ignore[misc]  # mypy infers no lambda default
                        min(200, max(10, 200_000 // points)))
         ours.append(seconds)
         if points <= TOPPRA_UP_TO:
-            theirs.append(best(lambda stages=stages: toppra_profile(stages, 0.0, 0.0), 3))  # type: ignore[misc]
+            theirs.append(best(lambda stages=stages: toppra_profile(stages, 0.0, 0.0), 3))  # type: ignore[misc]  # mypy infers no lambda default
         rows.append([str(points), f"{seconds * 1e3:.3f}", f"{seconds / points * 1e9:.0f}",
                      f"{theirs[-1] * 1e3:.1f}" if points <= TOPPRA_UP_TO else "",
                      f"{duration(stages, compiled_profile(stages, 0.0, 0.0)):.6f}"])

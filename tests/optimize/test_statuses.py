@@ -161,7 +161,7 @@ def test_the_processor_clock_stands_still_while_waiting() -> None:
     assert cpu.status is Status.EVALUATIONS
     assert cpu.seconds < 0.25
     with pytest.raises(ArgumentError, match=r"budget\.clock"):
-        Budget(clock="sundial")  # type: ignore[arg-type]
+        Budget(clock="sundial")  # type: ignore[arg-type]  # wrong on purpose
 
 
 def test_damaged_files_are_named(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ MAX_INCREMENT = 0.2  # rad; the first dropped term of the series is below 1e-17 
 
 
 @numba.njit(inline="always", fastmath=STRICT)
-def _turned(c, s, a):  # type: ignore[no-untyped-def]
+def _turned(c, s, a):  # type: ignore[no-untyped-def]  # numba infers
     """(cos, sin) turned by the small angle a."""
     q = a * a
     sin = a * (1.0 + q * (S3 + q * (S5 + q * (S7 + q * S9))))
@@ -34,7 +34,7 @@ def _turned(c, s, a):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(inline="always", fastmath=STRICT)
-def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]
+def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]  # numba infers
     """Actuator.step_mean on scalars, without branches."""
     low, high = mean - half, mean + half
     span = high - low
@@ -48,7 +48,7 @@ def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
-def _kernel(  # type: ignore[no-untyped-def]
+def _kernel(  # type: ignore[no-untyped-def]  # numba infers
         node, rate, g0, g1, g2, r0, r1, r2, weights, width, inverse, forward, sat, dz, x, y, yaw, duration, out):
     """Fill ``out`` (3 + 4, n) with final x, y, yaw and the wheel travel of n candidates (four wheels)."""
     steps, n = g0.shape[0], x.shape[1]

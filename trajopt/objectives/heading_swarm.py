@@ -4,7 +4,8 @@ The formulas are those of ``rollout``, as in ``swarm``: control values enter eac
 and goal through one constant. Sines and cosines are not evaluated: every rotation is the previous one turned by a
 small increment (``swarm.turned``), exact to rounding up to ``compiled.MAX_INCREMENT``. Candidates run in blocks of
 LANES over one flat state, so that the innermost loop becomes vector instructions. A test holds the result together
-with ``rollout.roll_out`` to 1e-12.
+with ``rollout.roll_out`` to 1e-12. What is alike in ``swarm._block`` stays written out twice: there the heading is
+known before the search, which removes most of the work of a step, and both need all their values in registers.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _ROWS, _SUMS = 26, 15
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
-def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
+def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba infers
     """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in place.
 
     Rows of ``co``: three Gauss points with heading (constant, h1, h2) and rate times weight (x, y constants, row of
@@ -99,7 +100,7 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _swarm(co, first, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]
+def _swarm(co, first, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]  # numba infers
     """Fill ``out`` (7, n) for candidates ``z`` (n, d): final x, y, yaw and the travel of four wheels.
 
     ``places`` (7,): where x1, y1, x2, y2, h1, h2 and the duration stand in a candidate, -1 for ``fixed``'s value.

@@ -31,7 +31,7 @@ _SUMS = 10  # first row that is added up over the steps
 
 
 @numba.njit(inline="always", fastmath=STRICT)
-def step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
+def step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]  # numba infers
     """Actuator.step_mean in wheel travel: mean d, half-span h, limits as travel a step.
 
     Half-spans below ``tiny`` are widened to it, which changes nothing but exactly at a kink of the actuator.
@@ -46,7 +46,7 @@ def step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(inline="always", fastmath=STRICT)
-def turned(c, s, a):  # type: ignore[no-untyped-def]
+def turned(c, s, a):  # type: ignore[no-untyped-def]  # numba infers
     """(cos, sin) turned by the small angle a."""
     q = a * a
     sin = a * (1.0 + q * (S3 + q * (S5 + q * (S7 + q * S9))))
@@ -55,7 +55,7 @@ def turned(c, s, a):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
-def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
+def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba infers
     """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in place."""
     i00, i01, i10, i11 = inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1]
     i20, i21, i30, i31 = inverse[2, 0], inverse[2, 1], inverse[3, 0], inverse[3, 1]
@@ -102,7 +102,7 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]
+def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]  # numba infers
     """Fill ``out`` (7, n) for candidates ``z`` (n, d): final x, y, yaw and the travel of four wheels.
 
     ``places`` (5,): where x1, y1, x2, y2 and the duration stand in a candidate, or -1 for ``fixed``'s value.
@@ -127,7 +127,7 @@ def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def terminal_costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type: ignore[no-untyped-def]
+def terminal_costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type: ignore[no-untyped-def]  # numba infers
     """Table 4.4 of thesis 000 from final states ``end`` (7, n)."""
     for i in range(end.shape[1]):
         total = 0.0

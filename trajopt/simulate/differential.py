@@ -90,7 +90,7 @@ class DriveRecord:
     @property
     def slip_ratio(self) -> float:
         """Root mean square of the wheels' slip over that of the speed."""
-        return float(np.sqrt(np.mean(self.slip**2)) / np.sqrt(np.mean(self.speed**2)))
+        return slip_share(self.slip, self.speed)
 
     @property
     def goal_offset(self) -> float:
@@ -321,3 +321,8 @@ def _wall(bullet: Any, client: int, wall: Wall) -> int:
 
 def _folded(angle: Any) -> Any:
     return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def slip_share(slip: Array, speed: Array) -> float:
+    """Root mean square of ``slip`` over that of ``speed``, both m/s."""
+    return float(np.sqrt(np.mean(slip**2)) / np.sqrt(np.mean(speed**2)))

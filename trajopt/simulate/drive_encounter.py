@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from trajopt.control.encounter import Course, Obstacle, World
 from trajopt.control.replan import TIME_STEP, Planner, Run, Sensor, SpeedPlan, replan, run_encounter
 from trajopt.control.tracking import Tracker
-from trajopt.simulate.differential import DriveOptions, DriveSession, Floor, drive_session
+from trajopt.simulate.differential import DriveOptions, DriveSession, Floor, drive_session, slip_share
 from trajopt.simulate.powerbot_model import DriveRobot
 
 Array = NDArray[np.float64]
@@ -41,7 +41,7 @@ class DrivenEncounter:
     @property
     def slip_ratio(self) -> float:
         """Root mean square of the wheels' slip over that of the speed."""
-        return float(np.sqrt(np.mean(self.slip**2)) / np.sqrt(np.mean(self.speed**2)))
+        return slip_share(self.slip, self.speed)
 
 
 def drive_encounter(where: Course, robot: DriveRobot, floor: Floor, sensor: Sensor, world: World, *,
