@@ -23,9 +23,9 @@ from trajopt.maneuver import Configuration, Plan, approach_target, configuration
 from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.search import minimize
-from trajopt.problem import WHEELS, load_problem
-from trajopt.simulate.climb import Climb, Outcome, Rate, StepScene, climb_all, reached, run_approach
-from trajopt.simulate.engine import Command
+from trajopt.problem import load_problem
+from trajopt.simulate.climb import Climb, Outcome, Rate, climb_all, reached, run_approach
+from trajopt.study.climb_trials import NEAREST, approach_command, before_step, critical_wheels, four, step_scene
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,6 @@ THESIS = {("lateral", 0.05): "0/10", ("forward35", 0.05): "5/10", ("forward45", 
           ("lateral", 0.035): "4/10, 2/10", ("forward35", 0.035): "most, 10/10", ("forward45", 0.035): "most, 10/10"}
 FRICTION = (0.6, 1.0)  # range, issue's trials
 POSITION_SD, YAW_SD, WHEEL_SD = 0.003, math.radians(0.5), 0.05  # m, rad, rad: of the state a climb starts from; chosen
-START_POSITION_SD, START_YAW_SD, START_WHEEL_SD = 0.005, math.radians(0.5), 0.05  # of the start of an approach; chosen
-NEAREST = 0.004  # m, least gap a trial may start with
 PSO_SEARCHES = 5  # of the thesis's PSO, each serving an equal share of the trials
 PHASES = np.linspace(-2.4, 2.4, 9)  # rad, along the rotation, where the wheel meets the step
 TORQUES, FRICTIONS = (2.0, 4.0, 8.0), (0.5, 0.8)
@@ -66,13 +64,6 @@ class Trial:
     seconds: float  # wall time, mean of its cell; nan where it was not taken
 
 
-def step_scene(problem: ManeuverProblem, friction: float, torque: float | None = None) -> StepScene:
-    """The problem's step with another friction and torque."""
-    r = problem.robot
-    return StepScene(problem.obstacle.height, problem.obstacle.place, problem.obstacle.direction, friction,
-                     r.torque_limit if torque is None else torque, r.minor_radius, r.hub_depth, r.hub_gap)
-
-
 def plan_of(problem: ManeuverProblem, configuration: Configuration) -> Plan:
     """The exact plan; these problems all have one."""
     plan = plan_configuration(problem, configuration)
@@ -87,23 +78,10 @@ def climb_from(problem: ManeuverProblem, plan: Plan, wheels: Array, rng: Generat
     dx = min(float(rng.normal(0.0, POSITION_SD)), problem.approach.gap - NEAREST)
     shift = np.array([dx, rng.normal(0.0, POSITION_SD), yaw_error + rng.normal(0.0, YAW_SD)])
     angles = wheels + rng.normal(0.0, WHEEL_SD, 4)
-    pose = _before_step(problem, np.array([x, y, yaw]) + shift)
+    pose = before_step(problem, np.array([x, y, yaw]) + shift)
     c = plan.configuration
-    critical = (WHEELS.index(c.critical[0]), WHEELS.index(c.critical[1]))
-    return Climb(step_scene(problem, float(rng.uniform(*FRICTION))), pose, _four(angles), c.direction, critical,
-                 plan.target.travel)
-
-
-def _before_step(problem: ManeuverProblem, pose: Array) -> tuple[float, float, float]:
-    """The pose, moved back from the step where a corner would be nearer than NEAREST (steps along +x)."""
-    corners = np.array(problem.platform.footprint) @ np.array([math.cos(pose[2]), -math.sin(pose[2])])
-    room = problem.obstacle.place[0] - NEAREST - float(corners.max())
-    return min(float(pose[0]), room), float(pose[1]), float(pose[2])
-
-
-def _four(values: Array) -> tuple[float, float, float, float]:
-    a, b, c, d = (float(v) for v in values)
-    return a, b, c, d
+    return Climb(step_scene(problem, float(rng.uniform(*FRICTION))), pose, four(angles), c.direction,
+                 critical_wheels(c), plan.target.travel)
 
 
 def pso_endings(height: float, name: str, searches: int) -> list[tuple[Array, float]]:
@@ -168,19 +146,10 @@ def driven(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
                     lost.append(Outcome((False,) * 4, False, False, True, recording.reason, 0.0))
                     continue
                 pose, wheels = reached(recording)
-                climbs.append(replace(climb, pose=_before_step(problem, np.array(pose)), wheels=wheels))
+                climbs.append(replace(climb, pose=before_step(problem, np.array(pose)), wheels=wheels))
             outcomes = climb_all(climbs, engine=engine, workers=workers)
             yield _rows("driven", engine, NAMES[configuration.name], "exact, open loop",
                         climbs + climbs[:1] * len(lost), outcomes + lost)
-
-
-def approach_command(problem: ManeuverProblem, plan: Plan, rng: Generator) -> Command:
-    """The plan's wheel speeds from a start with random errors of pose and wheel angles."""
-    times = np.linspace(0.0, plan.duration, max(2, round(plan.duration / 0.002)))
-    errors = rng.normal(0.0, [START_POSITION_SD, START_POSITION_SD, START_YAW_SD])
-    pose = np.array(problem.start.pose) + errors
-    return Command(times, plan.trajectory.at(times).wheel_speeds, (float(pose[0]), float(pose[1]), float(pose[2])),
-                   _four(np.array(problem.start.wheels) + rng.normal(0.0, START_WHEEL_SD, 4)))
 
 
 def phases(engine: str, runs: int, workers: int) -> Iterator[list[Trial]]:
@@ -205,12 +174,12 @@ def _at_phase(problem: ManeuverProblem, configuration: Configuration, phase: flo
     target = approach_target(problem, configuration, phase=configuration.window.middle)
     spin = np.sign(problem.platform.inverse @ np.array([*configuration.direction, 0.0]))
     wheels = np.array(target.wheels)
-    critical = (WHEELS.index(configuration.critical[0]), WHEELS.index(configuration.critical[1]))
+    critical = critical_wheels(configuration)
     for i in critical:
         wheels[i] += spin[i] * (phase - configuration.window.middle)
     rng = np.random.default_rng([number, 99])
     pose = np.array(target.pose) + rng.normal(0.0, [0.0005, 0.0005, math.radians(0.1)])
-    return Climb(step_scene(problem, friction, torque), _before_step(problem, pose), _four(wheels),
+    return Climb(step_scene(problem, friction, torque), before_step(problem, pose), four(wheels),
                  configuration.direction, critical, target.travel)
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.duration import DurationObjective
 from trajopt.objectives.terminal import TerminalObjective, folded, terminal_objective
@@ -142,17 +143,19 @@ def time_path(problem: PathProblem, *, engine: str = "auto") -> Trajectory:
 
 
 def validate(trajectory: Trajectory, problem: Problem, *, engine: str = "pybullet",
-             picture: bool = False) -> ValidationReport:
-    """Drive a trajectory open loop in a physics engine with real rollers, and measure how far it gets.
+             picture: bool = False, control: Mode | None = None, seed: int = 0) -> ValidationReport:
+    """Drive a trajectory in a physics engine with real rollers, and measure how far it gets.
 
-    ``engine``: "pybullet" or "mujoco". Raises MissingDependencyError where the engine is not installed and
+    ``engine``: "pybullet" or "mujoco". ``control``: None drives the planned wheel speeds; "open loop", "pose" or "pose
+    and phase" switch on wheel servo, pose feedback, feedback of pose and critical wheel angles, with a pose
+    measured with noise drawn from ``seed``. Raises MissingDependencyError where the engine is not installed and
     SimulationError where the simulation leaves physics.
     """
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError("trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory has one)")
     if not isinstance(problem, Problem):
         raise ArgumentError("problem", type(problem).__name__, "the Problem that was solved")
-    return drive_trajectory(trajectory, problem, engine=engine, picture=picture)
+    return drive_trajectory(trajectory, problem, engine=engine, picture=picture, control=control, seed=seed)
 
 
 def _timed(terminal: TerminalObjective, path: Path, x: Array) -> tuple[Trajectory | None, InfeasibleError | None]:

@@ -7,17 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trajopt.control.approach import (
-    Estimate,
-    Goal,
-    Sensors,
-    approach_controller,
-    correct,
-    predict,
-    reference_of,
-    resolved,
-    wheel_path,
-)
+from trajopt.control.approach import Estimate, Sensors, approach_controller, correct, predict
+from trajopt.control.bend import ROOM, ROOM_WEIGHT, Goal, reference_of, resolved, wheel_path
 from trajopt.errors import ArgumentError
 from trajopt.maneuver import Plan, configurations, plan_configuration
 from trajopt.maneuver_problem import load_maneuver
@@ -117,6 +108,26 @@ def test_bends_leave_the_present_speed_as_it_is(plan: Plan) -> None:
     new = resolved(reference, 1.0, reference.at(1.0)[1], angles + np.array([0.2, 0.0, -0.2, 0.0]), goal, ROBOT)
     assert np.abs((new.wheels[-1] - goal.wheels)[list(goal.critical)]).max() < 0.02
     assert np.abs(new.wheels_at(1.001)[1] - speeds).max() < 0.05 * np.abs(speeds).max()
+
+
+def test_a_bent_path_keeps_its_room_where_the_free_bend_would_cross_the_step() -> None:
+    """Phase errors that free bends answer with a detour, some of them through the step."""
+    problem = load_maneuver(FILE.with_name("step_3_5cm.toml"))
+    found = next(c for c in configurations(problem.robot.wheel, problem.obstacle) if c.name == "forward -35 deg")
+    plan = plan_configuration(problem, found)
+    assert isinstance(plan, Plan)
+    reference, ground = reference_of(plan.trajectory, np.zeros(4)), problem.free_ground
+    goal = Goal(reference.pose[-1], reference.wheels[-1], critical(plan), 30.0, ground)
+    when = 0.6 * plan.duration
+    rooms = []
+    for error in np.linspace(-0.5, 0.5, 11):
+        wheels = reference.wheels_at(when)[0] + error * np.array([1.0, -1.0, -1.0, 1.0])
+        free, kept = (resolved(reference, when, reference.at(when)[1], wheels, g, ROBOT)
+                      for g in (replace(goal, ground=None), goal))
+        rooms.append([float(ground.margin(*r.pose.T).min()) for r in (free, kept)])
+    crossed, kept_room = np.min(rooms, axis=0)
+    assert crossed < 0.0
+    assert kept_room > ROOM - 2 * ROOM_WEIGHT
 
 
 def test_a_doubtful_estimate_chases_phase_less_and_a_path_too_short_for_it_keeps_the_pose(plan: Plan) -> None:

@@ -13,19 +13,22 @@ from trajopt.study.cases import Case
 from trajopt.study.sweepfile import load_sweep
 
 
-def test_a_trial_is_the_climb_without_shortcuts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("mujoco")
     plan = load_sweep(ROOT / "problems" / "sweeps" / "climb_rate.toml")
     assert len(plan.table) == 6000
     case = plan.table.rows()[4321]
-    short = plan.run(case)
+    seen: list[Climb] = []
 
-    def plain(climb: Climb, engine: str) -> Outcome:
+    def watched(climb: Climb, engine: str) -> Outcome:
+        seen.append(climb)
         return run_climb(climb, engine)
 
-    monkeypatch.setattr(climb_study, "_outcome", plain)
-    assert plan.run(case) == short
-    assert short["climbed"] in (0.0, 1.0)
+    monkeypatch.setattr(climb_study, "run_climb", watched)
+    row = plan.run(case)
+    step = seen[0].step
+    assert (step.height, step.friction, step.torque) == (case["obstacle.height"], case["friction"], case["torque"])
+    assert row["climbed"] == float(run_climb(seen[0], case["engine"]).critical_up)
 
 
 def test_all_configurations_of_the_study_are_there_and_others_are_named() -> None:

@@ -12,8 +12,8 @@ from trajopt.errors import TrajoptError
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
                   help="Plan, time and check motions of wheeled ground robots.")
-for command in (search.solve, search.validate, maneuvers.plan, paths.explain, paths.export, paths.compare,
-                search.schema, sweep.report):
+for command in (search.solve, search.validate, maneuvers.plan, maneuvers.climb, paths.explain, paths.export,
+                paths.compare, search.schema, sweep.report):
     app.command()(command)
 app.add_typer(bench.app, name="bench")
 app.add_typer(sweep.app, name="sweep")

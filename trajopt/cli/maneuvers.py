@@ -1,17 +1,22 @@
-"""``trajopt plan``: how to meet a step, every configuration with an exact, timed path."""
+"""``trajopt plan``: how to meet a step, every configuration with an exact, timed path; ``trajopt climb``: how often
+that climbs in physics."""
 
 from __future__ import annotations
 
 import math
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich import box
 from rich.table import Table
 
-from trajopt.cli.shared import FAULTY, Overrides, ProblemFile, console, overrides
+from trajopt.cli.shared import FAULTY, Bar, ControlOption, Overrides, ProblemFile, console, control_mode, overrides
+from trajopt.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from trajopt.maneuver import Maneuver, Plan
 
 
 def plan(problem: ProblemFile, set_: Overrides = None,
@@ -55,3 +60,45 @@ def plan(problem: ProblemFile, set_: Overrides = None,
         console.print(f"written to {out}", highlight=False, soft_wrap=True)
     if not found.plans:
         raise typer.Exit(FAULTY)
+
+
+def climb(problem: ProblemFile, set_: Overrides = None,
+          configuration: Annotated[str | None, typer.Option(help="name in the table of plan; default: best")] = None,
+          trials: Annotated[int, typer.Option(help="number of trials")] = 20,
+          first: Annotated[int, typer.Option(help="number of the first trial: each draws from its own")] = 0,
+          control: ControlOption = "pose-and-phase",
+          engine: Annotated[str, typer.Option(help="mujoco or pybullet")] = "mujoco",
+          workers: Annotated[int, typer.Option(help="worker processes")] = 1,
+          out: Annotated[Path | None, typer.Option("--out", help="folder for trials.csv and a picture")] = None,
+          pictures: Annotated[bool, typer.Option(help="draw a picture into the folder")] = True) -> None:
+    """Drive a plan in physics and climb from where it ends, many times with random errors."""
+    from trajopt.maneuver import plan_climb
+    from trajopt.maneuver_problem import load_maneuver
+    from trajopt.report.climb_trials import climb_trials_table, save_climb_trials_picture, write_climb_trials
+    from trajopt.study.climb_trials import climb_trials
+
+    for name, value, least in (("--trials", trials, 1), ("--first", first, 0)):
+        if value < least:
+            raise ArgumentError(name, value, f"a whole number >= {least}")
+    mode = control_mode(control)
+    found = plan_climb(load_maneuver(problem, overrides(set_)))
+    chosen = _chosen(found, configuration)
+    with Bar(f"{engine}", trials) as bar:
+        done = climb_trials(found.problem, chosen, range(first, first + trials), control=mode, engine=engine,
+                            workers=workers, progress=bar.count)
+    console.print(climb_trials_table(done, f"{chosen.configuration.name} in {engine}, control: {control}"))
+    if out is not None:
+        write_climb_trials(done, out)
+        if pictures:
+            save_climb_trials_picture(done, found.problem, chosen, out)
+        console.print(f"written to {out}", highlight=False, soft_wrap=True)
+
+
+def _chosen(maneuver: Maneuver, name: str | None) -> Plan:
+    """The best plan, or the one with this configuration's name."""
+    if not maneuver.plans:
+        raise ArgumentError("problem", maneuver.problem.title, f"a manoeuvre with a plan; {maneuver.status}")
+    plans = {plan.configuration.name: plan for plan in maneuver.plans}
+    if name is not None and name not in plans:
+        raise ArgumentError("--configuration", name, "one that has a plan: " + ", ".join(plans))
+    return maneuver.plans[0] if name is None else plans[name]

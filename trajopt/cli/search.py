@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trajopt.cli.shared import FAULTY, Bar, Overrides, ProblemFile, console, overrides
+from trajopt.cli.shared import FAULTY, Bar, ControlOption, Overrides, ProblemFile, console, control_mode, overrides
 from trajopt.errors import ArgumentError
 
 if TYPE_CHECKING:
@@ -55,6 +55,8 @@ def solve(problem: ProblemFile,
 
 def validate(folder: Annotated[Path, typer.Argument(help="folder written by solve --out")],
              engine: Annotated[str, typer.Option(help="pybullet or mujoco")] = "pybullet",
+             control: ControlOption = "none",
+             seed: Annotated[int, typer.Option(help="seed of the measured pose's noise")] = 0,
              pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True) -> None:
     """Drive a saved solution in a physics engine with real rollers and measure the deviation."""
     from trajopt.pipeline import validate as validate_trajectory
@@ -66,7 +68,8 @@ def validate(folder: Annotated[Path, typer.Argument(help="folder written by solv
         raise ArgumentError("folder", str(folder), "a solution with a trajectory; this one has none: "
                             + solution.status)
     with Bar(f"{engine}", None):
-        report = validate_trajectory(solution.trajectory, solution.problem, engine=engine, picture=pictures)
+        report = validate_trajectory(solution.trajectory, solution.problem, engine=engine, picture=pictures,
+                                     control=control_mode(control), seed=seed)
     console.print(validation_table(report))
     write_validation(report, folder)
     if pictures:

@@ -11,13 +11,19 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError
 
 console = Console(width=None if sys.stdout.isatty() else 120)  # tables keep their shape when piped
 
 FAULTY = 1
+# What can be switched on in a physics check; None drives the planned wheel speeds.
+CONTROLS: dict[str, Mode | None] = {"none": None, "servo": "open loop", "pose": "pose",
+                                    "pose-and-phase": "pose and phase"}
 
 ProblemFile = Annotated[Path, typer.Argument(help="problem file (*.toml)", show_default=False)]
+ControlOption = Annotated[str, typer.Option(
+    "--control", help="none (planned wheel speeds), servo (planned wheel angles), pose, or pose-and-phase")]
 Overrides = Annotated[list[str] | None, typer.Option(
     "--set", help="change a key of the problem, e.g. --set goal.wheels=[0,0,0,0]", show_default=False)]
 
@@ -36,6 +42,13 @@ def overrides(items: list[str] | None) -> dict[str, Any]:
     return found
 
 
+def control_mode(name: str) -> Mode | None:
+    """The controller called ``name`` on the command line. Raises ArgumentError for another name."""
+    if name not in CONTROLS:
+        raise ArgumentError("--control", name, "one of " + ", ".join(CONTROLS))
+    return CONTROLS[name]
+
+
 class Bar:
     """Progress on a terminal; nothing when the output is piped."""
 
@@ -51,6 +64,10 @@ class Bar:
 
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
+
+    def count(self, done: int) -> None:
+        """Show how much is done."""
+        self._progress.update(self._task, completed=done)
 
     def update(self, evaluations: int, best: float) -> None:
         """Show how many evaluations are used and the best cost so far."""

@@ -7,9 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.control.approach import Mode, approach_controller
 from trajopt.errors import SimulationError
 from trajopt.problem import Problem
-from trajopt.simulate.engine import Camera, Command, Recording, make_engine
+from trajopt.robots.catalogue import robot_named
+from trajopt.simulate.approach_run import SETTLE, steered
+from trajopt.simulate.engine import Camera, Command, Controller, Recording, make_engine
 from trajopt.simulate.loc8_model import loc8_mecanum
 from trajopt.simulate.scene import Scene
 from trajopt.timing.trajectory import Trajectory
@@ -49,12 +52,17 @@ class ValidationReport:
 
 
 def drive_trajectory(
-    trajectory: Trajectory, problem: Problem, *, engine: str = "pybullet", picture: bool = False
+    trajectory: Trajectory, problem: Problem, *, engine: str = "pybullet", picture: bool = False,
+    control: Mode | None = None, seed: int = 0
 ) -> ValidationReport:
-    """Open loop at the planned wheel speeds on flat ground, LOC8 with Mecanum rollers.
+    """On flat ground, LOC8 with Mecanum rollers: at the planned wheel speeds, or under an approach controller.
 
-    Raises SimulationError when the run leaves physics.
+    With ``control`` the pose is measured as ``Sensors`` says, blurred by random numbers of ``seed``, and the plan that
+    the motion is compared with is timed as the controller wants it. Raises SimulationError when the run leaves
+    physics, ArgumentError where the controller refuses the trajectory.
     """
+    if control is not None:
+        return _controlled(trajectory, problem, engine, picture, control, seed)
     samples = max(2, round(trajectory.duration / SAMPLE_TIME) + 1)
     times = np.linspace(0.0, trajectory.duration, samples)
     state = trajectory.at(times)
@@ -67,32 +75,51 @@ def drive_trajectory(
         _triple(state.pose[0]),
         _four(problem.start.wheels),
     )
-    recording = make_engine(engine).run(
-        loc8_mecanum(), Scene(problem.scene.friction), command, picture=Camera() if picture else None
-    )
+    recording = _run(engine, problem, command, picture, None)
+    plan = trajectory.at(np.minimum(recording.times, trajectory.duration))
+    return _compared(plan.pose, np.asarray(problem.start.wheels) + plan.wheel_angles[-1], recording)
+
+
+def _controlled(trajectory: Trajectory, problem: Problem, engine: str, picture: bool, control: Mode,
+                seed: int) -> ValidationReport:
+    start = np.asarray(problem.start.wheels, dtype=np.float64)
+    controller = approach_controller(trajectory, robot_named(problem.robot.name), start, problem.goal.critical_indices,
+                                     cap=problem.limits.wheel_speed or np.inf, mode=control,
+                                     rng=np.random.default_rng(seed))
+    reference = controller.reference
+    command = Command(np.array([0.0, reference.times[-1] + SETTLE]), np.zeros((2, 4)), _triple(reference.pose[0]),
+                      _four(problem.start.wheels))
+    recording = _run(engine, problem, command, picture, steered(controller))
+    planned = np.column_stack([np.interp(recording.times, reference.times, column) for column in reference.pose.T])
+    return _compared(planned, reference.wheels[-1], recording)
+
+
+def _run(engine: str, problem: Problem, command: Command, picture: bool,
+         controller: Controller | None) -> Recording:
+    recording = make_engine(engine).run(loc8_mecanum(), Scene(problem.scene.friction), command, controller=controller,
+                                        picture=Camera() if picture else None)
     if recording.exploded:
         raise SimulationError(f"{engine}: the simulation left physics: {recording.reason}")
-    return _compared(trajectory, problem, recording)
+    return recording
 
 
-def _compared(trajectory: Trajectory, problem: Problem, recording: Recording) -> ValidationReport:
-    plan = trajectory.at(np.minimum(recording.times, trajectory.duration))
-    error = recording.pose - plan.pose
+def _compared(planned: Array, wheels: Array, recording: Recording) -> ValidationReport:
+    """Against the planned poses (N, 3) at the recording's times and the planned final wheel angles (4,)."""
+    error = recording.pose - planned
     distance = np.hypot(error[:, 0], error[:, 1])
-    heading = _final_direction(plan.pose)
+    heading = _final_direction(planned)
     dx, dy = error[-1, :2]
-    wheels = recording.wheel_angles[-1] - (np.asarray(problem.start.wheels) + plan.wheel_angles[-1])
     return ValidationReport(
         recording.engine,
         float(np.cos(heading) * dx + np.sin(heading) * dy),
         float(-np.sin(heading) * dx + np.cos(heading) * dy),
         float(error[-1, 2]),
-        wheels,
+        recording.wheel_angles[-1] - wheels,
         float(np.sqrt(np.mean(distance**2))),
         float(distance.max()),
-        float(np.sum(np.hypot(*np.diff(plan.pose[:, :2], axis=0).T))),
+        float(np.sum(np.hypot(*np.diff(planned[:, :2], axis=0).T))),
         recording.real_time_factor,
-        plan.pose,
+        planned,
         recording,
     )
 
