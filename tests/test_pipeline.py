@@ -89,6 +89,17 @@ def test_physics_of_a_scenario(scenario):
     assert report.path_max < 0.05
 
 
+def test_feedback_in_the_check_brings_pose_and_critical_wheels_to_the_goal(scenario):
+    pytest.importorskip("mujoco")
+    trajectory = solve(scenario).trajectory
+    report = validate(trajectory, scenario, engine="mujoco", control="pose and phase", seed=1)
+    assert report.final_distance < 0.01
+    assert abs(report.yaw) < np.radians(1.0)
+    assert np.abs(report.wheel_deviation[list(scenario.goal.critical_indices)]).max() < 0.1
+    other = validate(trajectory, scenario, engine="mujoco", control="pose and phase", seed=2)
+    assert other.final_distance != report.final_distance
+
+
 def test_missing_engine_is_named(scenario, monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(MissingDependencyError, match=r"trajopt\[simulate\]"):

@@ -37,7 +37,7 @@ from trajopt.robots.smdw import (
     refusal,
 )
 from trajopt.robots.smdw_geometry import DoubleWheel
-from trajopt.timing.scaling import time_scale
+from trajopt.timing.scaling import rough_duration, time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import path_margin
 
@@ -325,18 +325,18 @@ def _fastest(problem: ManeuverProblem, configuration: Configuration, target: Tar
     """The fastest of the most promising candidates, after checks on the fine grid."""
     reason = "every exact path leaves the free ground between the points of the search grid"
     timed: list[tuple[float, Path]] = []
+    limits, robot = problem.limits.as_limits(), problem.platform
     for candidate in candidates[:TIMED_CANDIDATES]:
         path = objective.path(candidate)
         if path_margin(path, objective.ground) < 0:
             continue
         try:
-            coarse = time_scale(path, problem.limits.as_limits(), robot=problem.platform, gridpoints=RANKING_GRID)
-            timed.append((coarse.duration, path))
+            timed.append((rough_duration(path, limits, robot=robot, gridpoints=RANKING_GRID), path))
         except InfeasibleError as error:
             reason = str(error)
     for _, path in sorted(timed, key=lambda t: t[0]):
         try:
-            trajectory = time_scale(path, problem.limits.as_limits(), robot=problem.platform)
+            trajectory = time_scale(path, limits, robot=robot)
             return _plan(problem, configuration, target, objective, trajectory)
         except InfeasibleError as error:
             reason = str(error)

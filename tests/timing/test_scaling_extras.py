@@ -12,7 +12,7 @@ from scaling_cases import PATHS, ROBOTS, limit
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.timing.linear import linear_factor
-from trajopt.timing.scaling import start_speeds, time_scale
+from trajopt.timing.scaling import rough_duration, start_speeds, time_scale
 from trajopt.timing.segments import segment_factors
 from trajopt.timing.sensitivity import sensitivities
 from trajopt.timing.stages import fine_rows
@@ -41,6 +41,18 @@ def test_a_stop_on_the_way_costs_braking_and_starting(engine):
 def test_stops_off_the_path_are_refused(stops):
     with pytest.raises(ArgumentError):
         time_scale(PATHS["straight"], DRIVE, stops=stops)
+
+
+def test_a_rough_duration_is_near_the_exact_one():
+    limits = [limit("speed", largest=1.5), limit("wheel_acceleration", largest=20.0), limit("slip", friction=0.4)]
+    for shape in ("straight", "slalom", "hairpin"):
+        exact = time_scale(PATHS[shape], limits, robot=ROBOTS["rear_cog"]).duration
+        rough = rough_duration(PATHS[shape], limits, robot=ROBOTS["rear_cog"], gridpoints=40)
+        assert rough == pytest.approx(exact, rel=0.03)
+        fine = rough_duration(PATHS[shape], limits, robot=ROBOTS["rear_cog"], gridpoints=1000)
+        assert fine == pytest.approx(exact, rel=1e-3)
+    # A straight line under bounds alone: both grids hold the bang-bang time.
+    assert rough_duration(PATHS["straight"], DRIVE) == pytest.approx(time_scale(PATHS["straight"], DRIVE).duration)
 
 
 def test_start_speeds_are_where_time_scaling_turns_infeasible():

@@ -65,11 +65,11 @@ def save_climb_trials_picture(trials: Sequence[ClimbTrial], problem: ManeuverPro
     from trajopt.report.style import in_style, save_figure
 
     edge = problem.obstacle.place[0] if problem.obstacle.direction == 0.0 else None  # drawn for steps along +x
+    planned = plan.trajectory.at(np.linspace(0.0, plan.duration, 200)).pose
     climbs = [(t.climb.pose, t.outcome.critical_up) for t in trials if t.climb is not None and t.outcome is not None]
     up = sum(good for _, good in climbs)
     panels = [Motions(f"{plan.configuration.name}: approach", [t.approach.pose for t in trials],
-                      [not t.ending.exploded for t in trials], np.array(plan.target.pose), edge,
-                      "black: the planned end")]
+                      [not t.ending.exploded for t in trials], planned, edge, "dashed: the plan")]
     if climbs:
         panels.append(Motions("climb", [pose for pose, _ in climbs], [good for _, good in climbs], None, edge,
                               f"blue: critical wheels up, {up} of {len(climbs)}"))

@@ -94,6 +94,21 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
                           "its size, and slowing down does not help (rest breaks it, or nearly)")
 
 
+def rough_duration(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
+                   gridpoints: int | ArrayLike | None = None) -> float:
+    """Duration (s) from rest to rest of the fastest profile that keeps the limits at the gridpoints; between them
+    nothing is checked. It ranks paths in a fifth of the time of ``time_scale``, on flat ground; raises as that does.
+    """
+    job = _job(path, limits, robot, None, (0.0, 0.0), "auto", ())
+    u = initial_grid(path, gridpoints)
+    _require_drivable(job, u)
+    fine, stages = _with_edges(job, u, 0.0)
+    profile = ENGINES[pick_engine(job.engine, stages)](stages, job.start, job.end)
+    require_motion(stages, profile)
+    speed = np.sqrt(profile[stages.kept])
+    return float(np.sum(2 * np.diff(fine.s) / (speed[1:] + speed[:-1])))  # s'' is constant between gridpoints
+
+
 def start_speeds(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
                  terrain: Terrain | None = None, end_speed: float = 0.0,
                  gridpoints: int | ArrayLike | None = None) -> tuple[float, float]:

@@ -107,29 +107,28 @@ def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Platform | No
 
 def fine_rows(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | None) -> FineRows:
     """Rows of all limits inside every interval of the grid u (N+1,)."""
-    inside = _rows_inside(path, u[:-1], u[1:], limits, robot)
-    one = assemble(sample_at(path, np.zeros(1), u[:1]), limits, robot)
-    return FineRows(u, path.parameter(u), *inside, one.names, one.row_owner, one.edges)
+    (share, a, b, c, bounds), some = _rows_inside(path, u[:-1], u[1:], limits, robot)
+    return FineRows(u, path.parameter(u), share, a, b, c, bounds, some.names, some.row_owner, some.edges)
 
 
 def _rows_inside(path: Path, left: Array, right: Array, limits: Sequence[Limit],
-                 robot: Platform | None) -> tuple[Array, Array, Array, Array, Array]:
-    """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,)."""
-    one = assemble(sample_at(path, np.zeros(1), left[:1]), limits, robot)
-    shape = (len(left), FINER + 1)
-    share = np.empty(shape)
-    a, b, c = (np.empty((*shape, len(one.row_owner))) for _ in range(3))
-    bounds = np.empty((*shape, len(limits)))
-    for first in range(0, shape[0], _CHUNK):
-        part = slice(first, min(first + _CHUNK, shape[0]))
+                 robot: Platform | None) -> tuple[tuple[Array, ...], Stages]:
+    """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,); and the last of the pieces that
+    they were assembled in, which has names, owners and edges."""
+    found: tuple[Array, ...] = ()
+    for first in range(0, len(left), _CHUNK):
+        part = slice(first, min(first + _CHUNK, len(left)))
         fine = _fine_grid(left[part], right[part])
         s = path.parameter(fine.ravel())
         rows = assemble(sample_at(path, s, fine.ravel()), limits, robot)
         s = s.reshape(fine.shape)
-        share[part] = (s - s[:, :1]) / (s[:, -1:] - s[:, :1])
-        for target, source in ((a, rows.a), (b, rows.b), (c, rows.c), (bounds, rows.bounds.T)):
-            target[part] = source.reshape(*fine.shape, -1)
-    return share, a, b, c, bounds
+        pieces = ((s - s[:, :1]) / (s[:, -1:] - s[:, :1]),
+                  *(values.reshape(*fine.shape, -1) for values in (rows.a, rows.b, rows.c, rows.bounds.T)))
+        if not found:
+            found = tuple(np.empty((len(left), *piece.shape[1:])) for piece in pieces)
+        for target, piece in zip(found, pieces, strict=True):
+            target[part] = piece
+    return found, rows
 
 
 def refined(path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot: Platform | None) -> FineRows:
@@ -140,7 +139,7 @@ def refined(path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot
     fresh[at[whole]] = False
     if not fresh.any():
         return fine
-    new = _rows_inside(path, u[:-1][fresh], u[1:][fresh], limits, robot)
+    new, _ = _rows_inside(path, u[:-1][fresh], u[1:][fresh], limits, robot)
 
     def merged(known: Array, added: Array) -> Array:
         values = np.empty((len(u) - 1, *known.shape[1:]))

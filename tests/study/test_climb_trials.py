@@ -1,0 +1,117 @@
+"""Climb trials: what each number draws, how controls differ, and what the command line says of it."""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from tests.study.crashes import ROOT
+from trajopt.cli import app
+from trajopt.errors import ArgumentError
+from trajopt.maneuver import Plan, configurations, plan_configuration
+from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
+from trajopt.simulate.approach_run import Ending
+from trajopt.study.climb_trials import NEAREST, Scatter, approach_command, before_step, climb_trials
+
+pytest.importorskip("mujoco")
+FILE = ROOT / "problems" / "smdw" / "step_3_5cm.toml"
+
+
+@pytest.fixture(scope="module")
+def problem() -> ManeuverProblem:
+    return load_maneuver(FILE)
+
+
+@pytest.fixture(scope="module")
+def plan(problem: ManeuverProblem) -> Plan:
+    found = next(c for c in configurations(problem.robot.wheel, problem.obstacle) if c.name == "forward -35 deg")
+    made = plan_configuration(problem, found)
+    assert isinstance(made, Plan)
+    return made
+
+
+def test_feedback_ends_nearer_than_planned_speeds_and_numbers_repeat(problem: ManeuverProblem, plan: Plan) -> None:
+    loose = climb_trials(problem, plan, (3,))[0]
+    seen: list[int] = []
+    steered = climb_trials(problem, plan, (3, 4), control="pose and phase", progress=seen.append)
+    assert seen == [1, 2]
+    assert steered[0].friction == loose.friction
+    assert steered[0].ending.position < loose.ending.position
+    for tight in steered:
+        assert tight.ending.within(0.01, math.radians(1.0), 0.1)
+        assert tight.outcome is not None
+        assert tight.climb is not None
+    again = climb_trials(problem, plan, (3, 4), control="pose and phase", workers=2)
+    for first, second in zip(steered, again, strict=True):
+        assert first.ending == second.ending
+        assert first.outcome == second.outcome
+        assert np.array_equal(first.approach.pose, second.approach.pose)
+
+
+def test_starts_scatter_as_stated(problem: ManeuverProblem, plan: Plan) -> None:
+    rng = np.random.default_rng(5)
+    commands = [approach_command(problem, plan, rng) for _ in range(60)]
+    poses = np.array([c.start_pose for c in commands]) - problem.start.pose
+    wheels = np.array([c.start_wheel_angles for c in commands]) - problem.start.wheels
+    scatter = Scatter()
+    assert poses.std(axis=0) == pytest.approx([scatter.position, scatter.position, scatter.yaw], rel=0.3)
+    assert wheels.std() == pytest.approx(scatter.wheels, rel=0.2)
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.7, -2.0])
+def test_a_climb_starts_before_the_step_whatever_its_direction(problem: ManeuverProblem, direction: float) -> None:
+    obstacle = problem.obstacle.model_copy(update={"direction": direction})
+    turned = problem.model_copy(update={"obstacle": obstacle})
+    normal, place = np.array(obstacle.normal), np.array(obstacle.place)
+    for yaw in (0.0, 1.1):
+        inside = np.array([*(place + 0.1 * normal), yaw])
+        x, y, kept = before_step(turned, inside)
+        corner = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+        reach = (np.array(turned.platform.footprint) @ corner.T + [x, y]) @ normal
+        assert kept == yaw
+        assert normal @ place - reach.max() == pytest.approx(NEAREST, abs=1e-12)
+        assert np.array([-normal[1], normal[0]]) @ (np.array([x, y]) - inside[:2]) == pytest.approx(0.0, abs=1e-12)
+        away = inside - [*(2.0 * normal), 0.0]
+        assert before_step(turned, away) == pytest.approx(tuple(away))
+
+
+def test_an_exploded_run_is_within_no_bounds() -> None:
+    assert Ending(0.0, 0.0, 0.0, exploded=False).within(0.0, 0.0, 0.0)
+    assert not Ending(0.0, 0.0, 0.0, exploded=True).within(1.0, 1.0, 1.0)
+    assert not Ending(0.0, 0.1, 0.0, exploded=False).within(1.0, 0.05, 1.0)
+
+
+def test_no_trials_or_workers_are_refused(problem: ManeuverProblem, plan: Plan) -> None:
+    with pytest.raises(ArgumentError, match="at least one trial"):
+        climb_trials(problem, plan, ())
+    with pytest.raises(ArgumentError, match="workers"):
+        climb_trials(problem, plan, (0,), workers=0)
+
+
+def test_the_command_writes_a_row_a_trial(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["climb", str(FILE), "--trials", "2", "--first", "7", "--control", "pose",
+                                    "--configuration", "lateral left", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert "critical wheels up" in done.stdout
+    with (tmp_path / "trials.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["number"] for row in rows] == ["7", "8"]
+    assert (tmp_path / "trials.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (("--control", "magic"), "one of none, servo"),
+    (("--trials", "0"), ">= 1"),
+    (("--configuration", "on its head"), "lateral left"),
+    (("--engine", "magic"), "pybullet"),
+    (("--workers", "0"), "at least 1"),
+])
+def test_what_the_command_refuses(arguments: tuple[str, str], words: str) -> None:
+    done = CliRunner().invoke(app, ["climb", str(FILE), *arguments])
+    assert isinstance(done.exception, ArgumentError)
+    assert words in str(done.exception)
