@@ -38,9 +38,6 @@ CIRCLE_ROLLERS = 8  # a hub, chosen with the next so that 4 wheels stay below Bu
 ELLIPSE_ROLLERS = 6  # a hub, chosen
 
 
-HubSizes = DoubleWheel  # the name by which the climb study knows it
-
-
 def smdw_wheel(
     sizes: DoubleWheel = DEFAULT_WHEEL,
     *,
