@@ -2,7 +2,8 @@
 
 Parts: ``planned`` starts sub-test 2 at the states that three planners reach (exact lattice at the middle of the window,
 the thesis's PSO aiming at its own 0, uniform random wheel angles); ``driven`` executes the exact plan open loop first
-(sub-test 1); ``phases`` maps the climb over wheel phase, torque and friction. Every trial is seeded by its place.
+(sub-test 1); ``phases`` maps the climb over wheel phase, torque and friction; ``causes`` varies heading error, gap and
+approach speed, one at a time. Every trial is seeded by its place.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.search import minimize
 from trajopt.problem import load_problem
-from trajopt.simulate.climb import Climb, Outcome, Rate, climb_all, reached, run_approach
+from trajopt.simulate.climb import CLIMB_SPEED, Climb, Outcome, Rate, climb_all, reached, run_approach
 from trajopt.study.climb_trials import NEAREST, approach_command, before_step, critical_wheels, four, step_scene
 
 Array = NDArray[np.float64]
@@ -40,6 +41,9 @@ POSITION_SD, YAW_SD, WHEEL_SD = 0.003, math.radians(0.5), 0.05  # m, rad, rad: o
 PSO_SEARCHES = 5  # of the thesis's PSO, each serving an equal share of the trials
 PHASES = np.linspace(-2.4, 2.4, 9)  # rad, along the rotation, where the wheel meets the step
 TORQUES, FRICTIONS = (2.0, 4.0, 8.0), (0.5, 0.8)
+CAUSES = {"heading error, deg": (0.0, 2.0, 5.0, 10.0), "gap, cm": (2.0, 5.0, 10.0, 20.0),
+          "approach speed, rad/s": (2.0, 4.0, 8.5, 15.0)}
+CAUSES_TORQUES, CAUSES_FRICTION = {"lateral": 3.0, "forward35": 2.0}, 0.8  # N m, -: chosen, where climbs are in doubt
 SOURCES = ("exact", "thesis PSO", "uniform")
 PACKAGES = ("numpy", "mujoco", "pybullet")
 
@@ -183,6 +187,35 @@ def _at_phase(problem: ManeuverProblem, configuration: Configuration, phase: flo
                  configuration.direction, critical, target.travel)
 
 
+def causes(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
+    """Climb rates over heading error, gap and approach speed, the others as planned; a list a cell."""
+    for file in FILES.values():
+        problem = load_maneuver(PROBLEMS / "smdw" / file)
+        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+            name = NAMES.get(configuration.name)
+            if name not in CAUSES_TORQUES:
+                continue
+            for cause, values in CAUSES.items():
+                for value in values:
+                    climbs = [_caused(problem, configuration, cause, value, n) for n in range(trials)]
+                    yield _rows("causes", engine, name, f"{cause}: {value:g}", climbs,
+                                climb_all(climbs, engine=engine, workers=workers))
+
+
+def _caused(problem: ManeuverProblem, configuration: Configuration, cause: str, value: float, number: int) -> Climb:
+    if cause == "gap, cm":
+        problem = problem.replace({"approach.gap": value / 100})
+    turned = math.radians(value) if cause == "heading error, deg" else 0.0
+    speed = value if cause == "approach speed, rad/s" else CLIMB_SPEED
+    target, rng = approach_target(problem, configuration), np.random.default_rng([number, 101])
+    errors = rng.normal([0.0, 0.0, turned], [POSITION_SD, POSITION_SD, YAW_SD])
+    pose = np.array(target.pose) + errors
+    wheels = np.array(target.wheels) + rng.normal(0.0, WHEEL_SD, 4)
+    torque = CAUSES_TORQUES[NAMES[configuration.name]]
+    return Climb(step_scene(problem, CAUSES_FRICTION, torque), before_step(problem, pose), four(wheels),
+                 configuration.direction, critical_wheels(configuration), target.travel, speed)
+
+
 def _rows(part: str, engine: str, name: str, source: str, climbs: Sequence[Climb],
           outcomes: Sequence[Outcome], seconds: float = math.nan) -> list[Trial]:
     return [Trial(part, engine, c.step.height, name, source, n, c.step.friction, c.step.torque, o.critical_up,
@@ -235,7 +268,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--runs", type=int, default=1, help="runs a cell of the phase map")
     parser.add_argument("--workers", type=int, default=1)
-    parser.add_argument("--parts", nargs="+", default=["planned", "driven", "phases"])
+    parser.add_argument("--parts", nargs="+", default=["planned", "driven", "phases", "causes"])
     parser.add_argument("--sources", nargs="+", default=list(SOURCES), help="planners of part 'planned'")
     parser.add_argument("--heights", nargs="+", type=float, default=list(FILES), choices=list(FILES), help="m")
     parser.add_argument("--resume", action="store_true", help="keep the cells of the trial file of part 'planned'")
@@ -251,7 +284,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for part in parts:
         work = {"planned": lambda: planned(given.engine, trials, given.workers, given.sources, files, done),
                 "driven": lambda: driven(given.engine, trials, given.workers),
-                "phases": lambda: phases(given.engine, given.runs, given.workers)}[part]()
+                "phases": lambda: phases(given.engine, given.runs, given.workers),
+                "causes": lambda: causes(given.engine, given.trials, given.workers)}[part]()
         for rows in work:  # written after every cell, so that a run cut short is kept
             cells.setdefault(part, []).extend(rows)
             _keep(name, [row for cell in cells.values() for row in cell])
@@ -267,8 +301,10 @@ NOTE = ("A wheel is up when its centre stays risen by 0.7 of the step's height o
 def _table(part: str, rows: Sequence[Trial]) -> ResultTable:
     if part == "phases":
         return phase_table(rows)
-    return rate_table("Sub-test 2 from planned states" if part == "planned" else
-                      "Sub-test 1 open loop, then sub-test 2", rows)
+    titles = {"planned": "Sub-test 2 from planned states", "driven": "Sub-test 1 open loop, then sub-test 2",
+              "causes": f"One cause at a time, friction {CAUSES_FRICTION:g}, " + ", ".join(
+                  f"{name} at {torque:g} N m" for name, torque in CAUSES_TORQUES.items())}
+    return rate_table(titles[part], rows)
 
 
 def kept(name: str) -> list[Trial]:

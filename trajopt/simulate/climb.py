@@ -68,7 +68,7 @@ class Climb:
     """Sub-test 2 from ``pose`` (m, m, rad) with ``wheels`` (rad): drive along ``motion``, a unit vector in the body.
 
     ``critical`` are the wheels (0 = front-left) that meet the step first, ``travel`` (m) what they have to
-    roll until then.
+    roll until then. ``speed`` (rad/s) at the wheels; a slower climb gets more time for the same distance.
     """
 
     step: StepScene
@@ -77,6 +77,7 @@ class Climb:
     motion: tuple[float, float]
     critical: tuple[int, int]
     travel: tuple[float, float]
+    speed: float = CLIMB_SPEED
 
 
 @dataclass(frozen=True)
@@ -132,9 +133,9 @@ def wilson(successes: int, trials: int, z: float = 1.959963984540054) -> tuple[f
 
 def climb_command(climb: Climb, robot: SimRobot) -> Command:
     """Constant wheel speeds along the motion, reached within RAMP."""
-    speed = CLIMB_SPEED * robot.wheels[0].radius
+    speed = climb.speed * robot.wheels[0].radius
     full = robot.wheel_speeds(speed * climb.motion[0], speed * climb.motion[1], 0.0)
-    times = np.array([0.0, RAMP, CLIMB_TIME])
+    times = np.array([0.0, RAMP, CLIMB_TIME * (CLIMB_SPEED / climb.speed)])
     return Command(times, np.vstack([np.zeros(4), full, full]), climb.pose, climb.wheels)
 
 
