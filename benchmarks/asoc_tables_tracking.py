@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from benchmarks.asoc_reference import TABLE_9, TABLE_10
 from benchmarks.common import ResultTable
 from trajopt.control.asoc_reference import Reference, constant_speed, planned_speed, square_corners
-from trajopt.control.asoc_tracking import Knowledge, Tracking, track_many
+from trajopt.control.asoc_tracking import FRICTION, Knowledge, Tracking, track_many
 from trajopt.errors import SimulationError
 from trajopt.robots.asoc import AsocGeometry
 from trajopt.simulate.asoc_bullet import asoc_in_pybullet
@@ -22,11 +22,12 @@ from trajopt.world.height_map import HeightMap
 from trajopt.world.rough import rough_ground
 
 Array = NDArray[np.float64]
+Errors = list[list[float]]  # RMS errors, m: one list a command, one entry a field
 
 GEOMETRY = AsocGeometry(4)
 FIELD = 9.0  # m between the places of two runs on one ground, chosen
 WIDE_FIELD = 21.0  # m, for physics by dead reckoning, which may end far from the path; chosen
-STUDENT = {3: 4.303, 10: 2.262}  # t, two-sided 95 %, by number of seeds
+STUDENT = {3: 4.303, 10: 2.262, 20: 2.093}  # t, two-sided 95 %, by number of values
 PHYSICS_SEED = 3  # of the rough ground in the engines
 KNOWLEDGE = {(True, True): Knowledge(True, 2.0), (True, False): Knowledge(False, 2.0),
              (False, True): Knowledge(True, np.inf), (False, False): Knowledge(False, np.inf)}  # as TABLE_10
@@ -37,29 +38,50 @@ PAIRS = (("ground known against unknown, position at 0.5 Hz", (True, True), (Tru
 
 
 @dataclass(frozen=True)
+class Command:
+    """A column group of Tables IX and X: what the robot should do, and on which friction."""
+
+    name: str
+    reference: Reference
+    friction: float = FRICTION
+
+
+FAST = Command("1.5 m/s", constant_speed(square_corners()))
+NO_SLIP = Command("1.5 m/s, no slip", FAST.reference, np.inf)
+PLANNED = Command("planned corners", planned_speed(square_corners()))
+COMMANDS = (FAST, NO_SLIP, PLANNED)
+NAMES = tuple(command.name for command in COMMANDS)
+ACROSS = tuple(f"across, {name}" for name in NAMES)
+STEPS = (*itertools.pairwise(TABLE_9), (0.0, 4.5))  # cm, pairs of roughness that are compared
+
+
+@dataclass(frozen=True)
 class Effort:
     """How much a run may take."""
 
     points: int
-    seeds: int
+    fields: int  # rough places in Tables IX and X
+    seeds: int  # rough grounds of Table X in physics
     physics: tuple[float, ...]  # sigmas, m
     pareto: int  # generations
     knowledge: tuple[float, ...]  # sigmas of Table X in physics, m
 
 
-FULL = Effort(4096, 10, (0.0, 0.015, 0.03, 0.045), 100, (0.03,))
-QUICK = Effort(512, 3, (), 20, ())
+FULL = Effort(4096, 20, 10, (0.0, 0.015, 0.03, 0.045), 100, (0.03,))
+QUICK = Effort(512, 3, 3, (), 20, ())
 
 
-def places(sigma: float, seeds: int) -> tuple[HeightMap, Array]:
-    """One ground with ``seeds`` independent fields in a row."""
-    ground = rough_ground(sigma, rng=np.random.default_rng(11), size=FIELD * seeds)
-    return replace(ground, origin=(-2.0, -2.0)), np.column_stack([FIELD * np.arange(seeds), np.zeros(seeds)])
+def places(sigma: float, count: int) -> tuple[HeightMap, Array]:
+    """One ground with ``count`` independent fields in rows, and where they start."""
+    side = int(np.ceil(np.sqrt(count)))
+    ground = rough_ground(sigma, rng=np.random.default_rng(11), size=FIELD * side)
+    return replace(ground, origin=(-2.0, -2.0)), FIELD * np.column_stack(np.divmod(np.arange(count), side))
 
 
-def runs(sigma: float, knowledge: Knowledge, reference: Reference, effort: Effort) -> list[Tracking]:
-    ground, origins = places(sigma, effort.seeds)
-    return track_many(GEOMETRY, ground, reference, [knowledge] * effort.seeds, origins)
+def runs(sigma: float, knowledge: Knowledge, command: Command, effort: Effort) -> list[Tracking]:
+    ground, origins = places(sigma, effort.fields)
+    return track_many(GEOMETRY, ground, command.reference, [knowledge] * effort.fields, origins,
+                      friction=command.friction)
 
 
 def interval(values: Sequence[float]) -> str:
@@ -79,40 +101,42 @@ def difference(less: Sequence[float], more: Sequence[float]) -> tuple[str, str]:
 
 def tables_9_and_10(effort: Effort) -> tuple[ResultTable, ResultTable, ResultTable]:
     """Tables IX and X, and their paired differences field by field."""
-    commands = (constant_speed(square_corners()), planned_speed(square_corners()))
-    rows, pairs, before = [], [], None
+    nine, by_sigma = table_9(effort)
+    ten, by_knowledge = table_10(effort)
+    pairs = [(f"IX: sigma {a:g} against {b:g} cm", by_sigma[a], by_sigma[b]) for a, b in STEPS]
+    pairs += [(f"X: {name}", by_knowledge[less], by_knowledge[more]) for name, less, more in PAIRS]
+    rows = [(name, *itertools.chain(*map(difference, first, second))) for name, first, second in pairs]
+    header = ("first against second", *itertools.chain(*((f"{c.name}: second - first", f"{c.name}: first is")
+                                                         for c in COMMANDS)))
+    return nine, ten, ResultTable("Tables IX, X: paired differences of the RMS error, % of body length, "
+                                  f"{effort.fields} fields", header, rows)
+
+
+def across(found: Sequence[Sequence[Tracking]]) -> list[str]:
+    return [interval([r.rms_across for r in part]) for part in found]
+
+
+def table_9(effort: Effort) -> tuple[ResultTable, dict[float, Errors]]:
+    rows, errors = [], {}
     for sigma, printed in TABLE_9.items():
-        found = [runs(sigma / 100, Knowledge(), reference, effort) for reference in commands]
-        rms = [[r.rms for r in part] for part in found]
-        rows.append((f"{sigma:g}", f"{printed:.2f}", *map(interval, rms),
-                     *(interval([r.rms_across for r in part]) for part in found),
+        found = [runs(sigma / 100, Knowledge(), command, effort) for command in COMMANDS]
+        errors[sigma] = [[r.rms for r in part] for part in found]
+        rows.append((f"{sigma:g}", f"{printed:.2f}", *map(interval, errors[sigma]), *across(found),
                      f"{np.degrees(max(np.abs(r.inclination).max() for r in found[0])):.0f}",
                      f"{100 * np.mean([r.airborne.mean() for r in found[0]]):.1f}"))
-        if before is not None:
-            old, values = before
-            both = [difference(a, b) for a, b in zip(values, rms, strict=True)]
-            pairs.append((f"IX: sigma {old:g} against {sigma:g} cm", *both[0], *both[1]))
-        before = sigma, rms
-    header = ("sigma, cm", "printed", "1.5 m/s", "planned corners", "across, 1.5 m/s", "across, planned",
-              "steepest wheel, deg", "wheels in the air, %")
-    nine = ResultTable("Table IX: RMS error, % of body length (1 m), kinematic, ground and position known", header,
-                       rows)
+    return ResultTable("Table IX: RMS error, % of body length (1 m), kinematic, ground and position known", (
+        "sigma, cm", "printed", *NAMES, *ACROSS, "steepest wheel, deg", "wheels in the air, %"), rows), errors
+
+
+def table_10(effort: Effort) -> tuple[ResultTable, dict[tuple[bool, bool], Errors]]:
     rows, errors = [], {}
     for case, printed in TABLE_10.items():
-        found = [runs(0.03, KNOWLEDGE[case], reference, effort) for reference in commands]
+        found = [runs(0.03, KNOWLEDGE[case], command, effort) for command in COMMANDS]
         errors[case] = [[r.rms for r in part] for part in found]
         rows.append(("0.5 Hz" if case[0] else "dead reckoning", "known" if case[1] else "unknown", f"{printed:.2f}",
-                     *map(interval, errors[case]), *(interval([r.rms_across for r in part]) for part in found)))
-    for name, less, more in PAIRS:
-        both = [difference(a, b) for a, b in zip(errors[less], errors[more], strict=True)]
-        pairs.append((f"X: {name}", *both[0], *both[1]))
-    ten = ResultTable("Table X: RMS error by knowledge, kinematic, sigma 3 cm (not printed; chosen)",
-                      ("position", "ground", "printed", "1.5 m/s", "planned corners", "across, 1.5 m/s",
-                       "across, planned"), rows)
-    paired = ResultTable(f"Tables IX, X: paired differences of the RMS error, % of body length, {effort.seeds} fields",
-                         ("first against second", "1.5 m/s: second - first", "first is", "planned: second - first",
-                          "first is (planned)"), pairs)
-    return nine, ten, paired
+                     *map(interval, errors[case]), *across(found)))
+    return ResultTable("Table X: RMS error by knowledge, kinematic, sigma 3 cm (not printed; chosen)", (
+        "position", "ground", "printed", *NAMES, *ACROSS), rows), errors
 
 
 def ground_of(sigma: float) -> HeightMap:
@@ -123,20 +147,19 @@ def ground_of(sigma: float) -> HeightMap:
 
 def physics(effort: Effort) -> tuple[ResultTable, list[tuple[str, AsocRun]]]:
     rows, kept = [], []
-    commands = {"1.5 m/s": constant_speed(square_corners()), "planned": planned_speed(square_corners())}
-    cases = itertools.product((asoc_in_pybullet, asoc_in_mujoco), effort.physics, commands, (False, True))
+    cases = itertools.product((asoc_in_pybullet, asoc_in_mujoco), effort.physics, (FAST, PLANNED), (False, True))
     for drive, sigma, command, driven in cases:
         if driven and sigma != 0.015:
             continue
         name = drive.__name__.rsplit("_", 1)[1]
-        label = (name, f"{100 * sigma:g}", command, "driven" if driven else "passive")
+        label = (name, f"{100 * sigma:g}", command.name, "driven" if driven else "passive")
         try:
-            run = drive(GEOMETRY, ground_of(sigma), commands[command], driven_pivots=driven)
+            run = drive(GEOMETRY, ground_of(sigma), command.reference, driven_pivots=driven)
         except SimulationError as error:
             rows.append((*label, "", "", "", "", str(error)))
             continue
         if not driven:
-            kept.append((f"{name}, {100 * sigma:g} cm, {command}", run))
+            kept.append((f"{name}, {100 * sigma:g} cm, {command.name}", run))
         rows.append((*label, f"{100 * run.rms:.2f}", f"{100 * run.rms_across:.2f}", str(run.losses),
                      f"{100 * run.airborne_share:.1f}", f"{run.times[-1] / run.wall_time:.1f} x real time"))
     return ResultTable("Physics: 65 kg, friction 0.6; RMS error in % of body length (printed for sigma 0: 8.67)",
@@ -147,14 +170,13 @@ def physics(effort: Effort) -> tuple[ResultTable, list[tuple[str, AsocRun]]]:
 def physics_knowledge(effort: Effort) -> ResultTable:
     """Table X with planned corners in MuJoCo, one rough field a seed, paired."""
     rows: list[tuple[str, ...]] = []
-    reference = planned_speed(square_corners())
     for sigma in effort.knowledge:
         errors: dict[tuple[bool, bool], list[float]] = {case: [] for case in KNOWLEDGE}
         for seed in range(effort.seeds):
             ground = rough_ground(sigma, rng=np.random.default_rng(100 + seed), size=WIDE_FIELD)
             ground = replace(ground, origin=((4.5 - WIDE_FIELD) / 2,) * 2)  # the square in the middle
             for case, knowledge in KNOWLEDGE.items():
-                errors[case].append(asoc_in_mujoco(GEOMETRY, ground, reference, knowledge=knowledge).rms)
+                errors[case].append(asoc_in_mujoco(GEOMETRY, ground, PLANNED.reference, knowledge=knowledge).rms)
         label = f"{100 * sigma:g}"
         rows += [(label, "0.5 Hz" if case[0] else "dead reckoning", "known" if case[1] else "unknown",
                   interval(values), "") for case, values in errors.items()]

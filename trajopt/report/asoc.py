@@ -8,11 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from trajopt.errors import ArgumentError
 from trajopt.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, new_figure
 
 Array = NDArray[np.float64]
 
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK)
+DASHES = ("-", (0, (6, 2)), (0, (3, 2)), (0, (1, 1)), "-.")  # lines on top of each other stay visible
 
 
 def curve_figure(x: Array, y: Array, printed: Mapping[float, float], labels: tuple[str, str, str]) -> Figure:
@@ -20,7 +22,8 @@ def curve_figure(x: Array, y: Array, printed: Mapping[float, float], labels: tup
     figure = new_figure(3.2, 5.2)
     axes = figure.add_subplot()
     axes.plot(x, y, color=BLUE, label="quadrature")
-    axes.plot(list(printed), list(printed.values()), "o", color=VERMILION, label="thesis's figure")
+    axes.plot(list(printed), list(printed.values()), "o", color=VERMILION, label="thesis's figure", clip_on=False,
+              zorder=3)
     axes.set_title(labels[0])
     axes.set_xlabel(labels[1])
     axes.set_ylabel(labels[2])
@@ -35,7 +38,7 @@ def map_figure(x: Array, y: Array, values: Array, labels: tuple[str, str, str],
     figure = new_figure(3.8, 5.4)
     axes = figure.add_subplot()
     lines = axes.contourf(x, y, values, levels=np.linspace(0, 1, 21), cmap="viridis")
-    figure.colorbar(lines, ax=axes, label="mean isotropy")
+    figure.colorbar(lines, ax=axes, label="mean isotropy", ticks=np.linspace(0, 1, 6))
     if ridge is not None:
         axes.plot(*ridge, color="white", linestyle="--", label="2 / cos(tilt)")
         axes.legend(labelcolor="white")
@@ -49,13 +52,16 @@ def map_figure(x: Array, y: Array, values: Array, labels: tuple[str, str, str],
 
 
 def tracks_figure(corners: Array, tracks: Sequence[tuple[str, Array]], title: str) -> Figure:
-    """Paths from above: ``tracks`` are (label, (n, 2) m) beside the commanded corners (Figures 29, 31)."""
-    figure = new_figure(4.6, 6.0)
+    """Paths from above: ``tracks`` are (label, (n, 2) m), five at most, beside the commanded corners (Figures 29,
+    31)."""
+    if len(tracks) > len(COLOURS):
+        raise ArgumentError("tracks", len(tracks), f"at most {len(COLOURS)}, or lines look alike")
+    figure = new_figure(4.6)
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     axes.plot(*corners.T, color=GREY, linestyle="--", label="commanded")
-    for colour, (label, track) in zip(COLOURS * len(tracks), tracks, strict=False):
-        axes.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.0, label=label)
+    for style, (label, track) in zip(zip(COLOURS, DASHES, strict=True), tracks, strict=False):
+        axes.plot(track[:, 0], track[:, 1], color=style[0], linestyle=style[1], linewidth=1.2, label=label)
     axes.set_title(title)
     axes.set_xlabel("x, m")
     axes.set_ylabel("y, m")
@@ -69,7 +75,7 @@ def speed_figure(series: Sequence[tuple[str, Array, Array]], commanded: float, t
     axes = figure.add_subplot()
     for colour, (label, times, speed) in zip(COLOURS * len(series), series, strict=False):
         axes.plot(times, speed, color=colour, linewidth=1.0, label=label)
-    axes.axhline(commanded, color=GREY, linestyle="--", linewidth=0.8)
+    axes.axhline(commanded, color=GREY, linestyle="--", linewidth=0.8, label="commanded")
     axes.axhline(0.48 * commanded, color=GREY, linestyle=":", linewidth=0.8, label="48 %, thesis's least")
     axes.set_title(title)
     axes.set_xlabel("time, s")
@@ -86,10 +92,14 @@ def front_figure(terms: Array, names: Sequence[str], best: Array) -> Figure:
     others = [k for k in range(len(names)) if k != axis]
     for place, k in enumerate(others):
         axes = figure.add_subplot(1, len(others), place + 1)
-        axes.plot(terms[:, axis], terms[:, k], ".", color=BLUE, markersize=3)
-        axes.plot(best[axis], best[k], "*", color=VERMILION, markersize=9)
+        front = axes.plot(terms[:, axis], terms[:, k], ".", color=BLUE, markersize=3)
+        star = axes.plot(best[axis], best[k], "*", color=VERMILION, markersize=9, clip_on=False)
+        axes.set_ylim(0, 1.05)
         axes.set_title(names[k])
         axes.set_xlabel("d_max / best")
         if place == 0:
             axes.set_ylabel("share of best")
+            figure.legend([*front, *star], ["Pareto front", "optimum of J"], loc="outside lower center", ncols=2)
+        else:
+            axes.tick_params(labelleft=False)
     return figure
