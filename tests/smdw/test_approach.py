@@ -152,8 +152,8 @@ def test_an_error_at_rest_is_shared_between_pose_and_phase_on_the_spot(plan: Pla
         control = approach_controller(plan.trajectory, ROBOT, np.zeros(4), critical(plan), cap=30.0,
                                       sensors=Sensors(position=0.0, yaw=0.0), mode=mode, rng=np.random.default_rng(1))
         truth, wheels, dt = control.goal.pose + np.array([0.004, 0.0, 0.0]), control.goal.wheels.copy(), 0.01
-        control._next_solve = math.inf  # on the way nothing is corrected
-        start = round(plan.duration / dt)
+        start = round(float(control.reference.times[-1]) / dt)
+        control._next_solve = start * dt  # on the way nothing is corrected
         for k in range(start, start + 130):
             turned = control.step(k * dt, truth, wheels) * dt
             truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, turned).pose

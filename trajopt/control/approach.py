@@ -33,7 +33,7 @@ ODOMETRY_NOISE = 0.06  # of the travel of a step, standard deviation: twice the 
 LEAST_TURN = math.radians(30.0)  # rad; with less turn the phase can hardly be corrected
 TOUCH_UP_AFTER = 0.1  # s at rest before the first correction on the spot (servo and filter have settled), chosen
 TOUCH_UP_TIME = 0.3  # s of one such correction, chosen
-TOUCH_UPS = 2  # at most, chosen
+TOUCH_UPS = 2  # corrections on the spot at most, chosen
 LEAST_TOUCH_UP = 0.01  # rad at a wheel (1 mm), chosen: smaller corrections are left
 
 
@@ -123,24 +123,29 @@ class ApproachController:
             blur = self.rng.normal(0.0, 1.0, 3) * [s.position, s.position, s.yaw]
             self.estimate = correct(self.estimate, pose + blur, s)
             self._next_measurement += s.period
-        left = self.reference.times[-1] - t
-        if self.mode != "open loop" and t >= self._next_solve - 1e-9 and left > LAST_RESOLVE:
-            place = math.sqrt(float(np.trace(self.estimate.covariance[:2, :2])) / 2)  # m, standard deviation
-            doubt = place * float(np.abs(self.robot.inverse[:, 0]).max())
-            self.reference = resolved(self.reference, t, self.estimate.pose, wheels, self.goal, self.robot,
-                                      phase=self.mode == "pose and phase", doubt=doubt)
+        if self.mode != "open loop" and t >= self._next_solve - 1e-9:
             self._next_solve += RESOLVE_EVERY
-        if self.mode != "open loop" and left <= -TOUCH_UP_AFTER and self._touch_ups < TOUCH_UPS:
-            self._touch_up(t, wheels)
+            left = self.reference.times[-1] - t
+            if left > LAST_RESOLVE:
+                self._resolve(t, wheels)
+            elif left <= -TOUCH_UP_AFTER and self._touch_ups < TOUCH_UPS:
+                self._touch_up(t, wheels)
         angle, speed = self.reference.wheels_at(t)
         return np.asarray(speed + SERVO_GAIN * (angle - wheels))
 
+    def _resolve(self, t: float, wheels: Array) -> None:
+        """Bend what remains of the path."""
+        place = math.sqrt(float(np.trace(self.estimate.covariance[:2, :2])) / 2)  # m, standard deviation
+        doubt = place * float(np.abs(self.robot.inverse[:, 0]).max())
+        self.reference = resolved(self.reference, t, self.estimate.pose, wheels, self.goal, self.robot,
+                                  phase=self.mode == "pose and phase", doubt=doubt)
+
     def _touch_up(self, t: float, wheels: Array) -> None:
         """Move on the spot where that brings pose and phase nearer to the goal by more than a millimetre."""
-        self._touch_ups += 1
         moved = resolved(_on_the_spot(self.goal, t), t, self.estimate.pose, wheels, self.goal, self.robot,
                          phase=self.mode == "pose and phase")
         if np.max(np.abs(moved.wheels[-1] - wheels)) > LEAST_TOUCH_UP:
+            self._touch_ups += 1
             self.reference = moved
 
 
