@@ -1,131 +1,127 @@
 """Pictures of the SMDW reproduction page, drawn from runs made here and from the trial files of other benchmarks.
 
-Counterparts of thesis 000: Figures 5.23-5.25 (searches over time interval), 6.4 and 6.11 (sub-test 1), 6.5 and 6.12
-(costs), 6.6, 6.7 and 6.13 (sub-test 2); climb rates, phase map and closed-loop endings.
+Counterparts of thesis 000: Figures 6.4 and 6.11 (sub-test 1), 6.6-6.8 and 6.13 (sub-test 2), 6.3 and 6.10 (set-ups),
+4.10, 4.18 and 6.9 (wheel); climb rates, phase map and closed-loop endings.
 """
 
 from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from benchmarks import closed_loop
-from benchmarks.climb import NAMES, approach_command, climb_from, plan_of, step_scene
+from benchmarks import closed_loop, smdw_printed
+from benchmarks.climb import NAMES, climb_from, plan_of
 from benchmarks.common import OUT, PROBLEMS
-from trajopt.maneuver import configurations
-from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
-from trajopt.objectives.terminal import terminal_objective
-from trajopt.optimize.search import minimize
-from trajopt.paths.path import Path as RobotPath
-from trajopt.problem import load_problem
+from trajopt.maneuver import Plan, configurations
+from trajopt.maneuver_problem import load_maneuver
+from trajopt.report.smdw import cam_figure, geometry_figure, setups_figure, wheel_at_step_figure
 from trajopt.report.smdw_trials import (
     ClimbCell,
     Motions,
     climb_rates_figure,
-    costs_figure,
     endings_figure,
     motions_figure,
     phase_map_figure,
-    searches_figure,
 )
-from trajopt.robots.smdw import loc8_smdw
-from trajopt.simulate.climb import judge, reached, record_climb, run_approach
+from trajopt.robots.smdw import DEFAULT_WHEEL, FITTED_WHEEL, loc8_smdw
+from trajopt.simulate.climb import Climb, judge, reached, record_climb, run_approach
 from trajopt.simulate.engine import Recording
+from trajopt.study.climb_trials import approach_command, step_scene
 
 Array = NDArray[np.float64]
 
-SWARM_ITERATIONS = 500  # of the thesis's PSO
-PARTICLES = 50  # of the thesis's PSO
 # Share of the thesis's ten runs that climbed, least and greatest (sections 6.1, 6.1.1, 6.2); "most" is not counted.
-THESIS_SHARE = {("lateral", 0.05): (0.0, 0.0), ("forward35", 0.05): (0.5, 0.5), ("forward45", 0.05): (0.5, 0.6),
-                ("lateral", 0.035): (0.2, 0.4), ("forward35", 0.035): (1.0, 1.0), ("forward45", 0.035): (1.0, 1.0)}
-SCENARIOS = ((1, "step_5cm.toml"), (2, "step_3_5cm.toml"))
+THESIS_SHARE: dict[tuple[str, float], tuple[float, float] | None] = {
+    ("lateral", 0.05): (0.0, 0.0), ("forward35", 0.05): (0.5, 0.5), ("forward45", 0.05): (0.5, 0.6),
+    ("lateral", 0.035): (0.2, 0.4), ("forward35", 0.035): (1.0, 1.0), ("forward45", 0.035): (1.0, 1.0)}
+SOURCE_NAMES = {"exact": "planned exactly", "thesis PSO": "thesis's PSO, re-run", "uniform": "uniform random phases"}
+SCENARIOS = {1: "step_5cm.toml", 2: "step_3_5cm.toml"}
+LOW_STEP = 0.035  # m, section 6.1.1: scenario 1's final states against a lower step
+NEAR = 0.02  # m, an end this near to its target is drawn as met, chosen
+# Targets of Tables 6.1 and 6.6, m, m, rad
+_YAWS = {"lateral": -math.pi / 2, "forward35": -0.611, "forward45": -math.pi / 4}
+TARGETS = {1: {name: (2.46 if name == "lateral" else 2.2, 0.76, yaw) for name, yaw in _YAWS.items()},
+           2: {name: (1.524 if name == "lateral" else 1.3, 0.0, yaw) for name, yaw in _YAWS.items()}}
 
 
-def searches(quick: bool, actuator: dict[str, float | bool]) -> Figure:
-    """Figures 5.23-5.25: what the thesis's PSO and the exact planner find over the time interval."""
-    intervals = (1.0, 5.0) if quick else tuple(0.5 * k for k in range(1, 15))
-    goal = np.array(load_problem(PROBLEMS / "smdw" / "table_5_3.toml").goal.pose[:2])
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """Sub-test 1 of one configuration: its plan, the recorded approaches and, from where each ended, the climb."""
 
-    def found(duration: float, optimizer: str, seed: int) -> Array:
-        problem = load_problem(PROBLEMS / "smdw" / "table_5_3.toml", {"spline.duration": duration, **actuator})
-        if optimizer == "lattice":
-            problem = problem.replace({"spline.free": ["p1", "p2", "heading"]})
-        objective = terminal_objective(problem)
-        path = objective.path(minimize(objective, objective.bounds, optimizer=optimizer, seed=seed).x)
-        return _places(path)
-
-    pso = "pso-thesis-enhanced"
-    return searches_figure([
-        ("PSO (5.23)", [(f"{t:g} s", found(t, pso, 0)) for t in intervals]),
-        ("PSO, 1 s, ten seeds (5.24)", [(f"{n}", found(1.0, pso, n)) for n in range(2 if quick else 10)]),
-        ("Exact (P1, P2, heading)", [(f"{t:g} s", found(t, "lattice", 0)) for t in (1.0, 5.0)]),
-    ], goal)
+    plan: Plan
+    approaches: list[Recording]
+    climbs: list[Climb]
 
 
-def _places(path: RobotPath) -> Array:
-    return path.position(np.linspace(path.start, path.end, 200))[:, :2]
+def driven(number: int, trials: int) -> dict[str, Driven]:
+    """Open-loop approaches of a scenario from starts with errors, friction 0.6-1.0, in MuJoCo, by configuration."""
+    problem = load_maneuver(PROBLEMS / "smdw" / SCENARIOS[number])
+    found = {}
+    for configuration in configurations(problem.robot.wheel, problem.obstacle):
+        if configuration.name not in NAMES:
+            continue
+        plan = plan_of(problem, configuration)
+        approaches, climbs = [], []
+        for n in range(trials):
+            rng = np.random.default_rng([n, 11])
+            scene = step_scene(problem, float(rng.uniform(0.6, 1.0)))
+            approaches.append(run_approach(scene, approach_command(problem, plan, rng)))
+            pose, wheels = reached(approaches[-1])
+            climbs.append(replace(climb_from(problem, plan, np.zeros(4), rng), step=scene, pose=pose, wheels=wheels))
+        found[configuration.name] = Driven(plan, approaches, climbs)
+    return found
 
 
-def costs(quick: bool) -> Figure:
-    """Figures 6.5, 6.12: best cost of the thesis's PSO over its iterations."""
+def first_sub_test(figure: str, runs: Mapping[str, Driven]) -> Figure:
+    """Figures 6.4 and 6.11: driven beside planned motions."""
     panels = []
-    for number, _ in SCENARIOS:
-        for name in NAMES.values():
-            problem = load_problem(PROBLEMS / "smdw" / f"scenario_{number}_{name}.toml", {"actuator.enabled": True})
-            objective = terminal_objective(problem)
-            lines = []
-            for seed in range(2 if quick else 10):
-                history = minimize(objective, objective.bounds, optimizer="pso-thesis-enhanced", seed=seed).history
-                lines.append((np.append(history.evaluations / PARTICLES, SWARM_ITERATIONS),
-                              np.append(history.cost, history.cost[-1])))
-            panels.append((f"scenario {number}, {name}", lines))
-    return costs_figure(panels)
+    for name, run in runs.items():
+        ideal = run.plan.trajectory.at(np.linspace(0.0, run.plan.duration, 200)).pose
+        misses = [math.hypot(*(a.pose[-1] - ideal[-1])[:2]) for a in run.approaches]
+        panels.append(Motions(f"{figure}: {name}", [a.pose for a in run.approaches], [m < NEAR for m in misses], ideal,
+                              run.climbs[0].step.place[0],
+                              f"black: planned; blue: ends within 2 cm\nmedian miss {100 * np.median(misses):.1f} cm"))
+    return motions_figure(panels, loc8_smdw())
 
 
-def motions(quick: bool) -> Iterator[tuple[str, Figure]]:
-    """Figures 6.4 and 6.11 (sub-test 1, open loop), 6.6 and 6.13 (sub-test 2 from where it ended), in MuJoCo."""
-    trials = 2 if quick else 10
-    for number, file in SCENARIOS:
-        problem = load_maneuver(PROBLEMS / "smdw" / file)
-        first, second = [], []
-        for configuration in configurations(problem.robot.wheel, problem.obstacle):
-            if configuration.name not in NAMES:
-                continue
-            plan = plan_of(problem, configuration)
-            runs = [_both(problem, configuration.name, n) for n in range(trials)]
-            target = np.array(plan.target.pose)
-            near = [bool(math.hypot(*(a.pose[-1] - target)[:2]) < 0.02) for a, _, _ in runs]
-            edge = problem.obstacle.place[0]
-            first.append(Motions(configuration.name, [a.pose for a, _, _ in runs], near, target, edge,
-                                 "blue: within 2 cm of the target"))
-            up = [good for _, _, good in runs]
-            second.append(Motions(configuration.name, [b.pose for _, b, _ in runs], up, None, edge,
-                                  f"blue: critical wheels up, {sum(up)} of {trials}"))
-        yield f"sub_test_1_scenario_{number}.png", motions_figure(first, loc8_smdw())
-        yield f"sub_test_2_scenario_{number}.png", motions_figure(second, loc8_smdw())
+def second_sub_test(climbs: Mapping[str, Sequence[Climb]]) -> Figure:
+    """Figures 6.6-6.8 and 6.13: two seconds against the step; titles are the keys."""
+    panels = []
+    for title, group in climbs.items():
+        recordings = [record_climb(climb) for climb in group]
+        up = [judge(climb, run).critical_up for climb, run in zip(group, recordings, strict=True)]
+        panels.append(Motions(title, [run.pose for run in recordings], up, None, group[0].step.place[0],
+                              f"blue: leading wheels up, {sum(up)} of {len(up)}"))
+    return motions_figure(panels, loc8_smdw())
 
 
-def _both(problem: ManeuverProblem, name: str, number: int) -> tuple[Recording, Recording, bool]:
-    """Sub-test 1 and the climb from where it ended, and whether the critical wheels came up."""
-    configuration = next(c for c in configurations(problem.robot.wheel, problem.obstacle) if c.name == name)
-    plan, rng = plan_of(problem, configuration), np.random.default_rng([number, 11])
-    scene = step_scene(problem, float(rng.uniform(0.6, 1.0)))
-    approach = run_approach(scene, approach_command(problem, plan, rng))
-    pose, wheels = reached(approach)
-    climb = replace(climb_from(problem, plan, np.zeros(4), rng), step=scene, pose=pose, wheels=wheels)
-    recording = record_climb(climb)
-    return approach, recording, judge(climb, recording).critical_up
+def motions(runs: Mapping[int, Mapping[str, Driven]], quick: bool) -> Iterator[tuple[str, Figure]]:
+    """Sub-tests 1 and 2 of both scenarios, scenario 1 at the lower step, and lateral with the yaw set right."""
+    numbers = {1: ("6.4", "6.6"), 2: ("6.11", "6.13")}
+    for number, found in runs.items():
+        first, second = numbers[number]
+        yield f"sub_test_1_scenario_{number}.png", first_sub_test(first, found)
+        yield f"sub_test_2_scenario_{number}.png", second_sub_test(
+            {f"{second}: {name}, {100 * run.climbs[0].step.height:g} cm": run.climbs for name, run in found.items()})
+    low = {name: [replace(c, step=replace(c.step, height=LOW_STEP)) for c in run.climbs]
+           for name, run in runs[1].items()}
+    yield "figure_6_7.png", second_sub_test({f"6.7: {name}, {100 * LOW_STEP:g} cm": c for name, c in low.items()})
+    printed = {g.yaw_set: g.climbs[: 2 if quick else None] for g in smdw_printed.groups()
+               if g.configuration == "lateral left" and g.height == LOW_STEP}
+    exact = [replace(c, pose=(*c.pose[:2], smdw_printed.SET_YAW)) for c in low["lateral left"]]
+    yield "figure_6_8.png", second_sub_test({"6.7a: lateral, printed states": printed[False],
+                                             "6.8: the same, yaw set to -90 deg": printed[True],
+                                             "6.8: our states, yaw set to -90 deg": exact})
 
 
-def _trials(part: str) -> list[dict[str, str]]:
-    """Rows of all climb trial files that exist."""
+def trial_rows(part: str) -> list[dict[str, str]]:
+    """Rows of all climb trial files that exist, without runs that left physics."""
     rows = []
     for file in sorted(OUT.glob("climb_*_trials.csv")):
         if "quick" not in file.stem:
@@ -134,51 +130,61 @@ def _trials(part: str) -> list[dict[str, str]]:
     return rows
 
 
-def climb_rates() -> Figure | None:
-    cells = []
-    rows = _trials("planned")
-    keys = dict.fromkeys((r["engine"], float(r["height"]), r["configuration"], r["source"]) for r in rows)
-    for engine, height, name, source in keys:
-        mine = [r["critical_up"] == "True" for r in rows
-                if (r["engine"], float(r["height"]), r["configuration"], r["source"]) == (engine, height, name, source)]
-        cells.append(ClimbCell(engine, height, name, source, sum(mine), len(mine), THESIS_SHARE[name, height]))
-    return climb_rates_figure(cells) if cells else None
+def climb_cells() -> list[ClimbCell]:
+    """Climbs from planned states: one cell an engine, step, configuration and planner."""
+    groups: dict[tuple[str, float, str, str], list[bool]] = {}
+    for r in trial_rows("planned"):
+        key = (r["engine"], float(r["height"]), r["configuration"], r["source"])
+        groups.setdefault(key, []).append(r["critical_up"] == "True")
+    order = list(SOURCE_NAMES)
+    return [ClimbCell(engine, height, name, SOURCE_NAMES[source], sum(up), len(up), THESIS_SHARE[name, height])
+            for (engine, height, name, source), up in sorted(groups.items(), key=lambda item: (
+                item[0][0], item[0][1], list(NAMES.values()).index(item[0][2]), order.index(item[0][3])))]
 
 
-def phase_map() -> Figure | None:
-    rows = [r for r in _trials("phases") if r["engine"] == "mujoco"]
+def phase_map(engine: str) -> Figure | None:
+    """Climbs over phase, torque and friction in one engine; None without its trials."""
+    rows = [r for r in trial_rows("phases") if r["engine"] == engine]
     if not rows:
         return None
     labels = sorted({r["source"] for r in rows}, key=float)
-    shares: dict[tuple[str, float], dict[tuple[float, float], list[float]]] = {}
+    hits: dict[tuple[str, float], dict[tuple[float, float], list[list[bool]]]] = {}
     for r in rows:
-        panel = shares.setdefault((r["configuration"], float(r["height"])), {})
-        panel.setdefault((float(r["torque"]), float(r["friction"])), [math.nan] * len(labels))
-    for panel_key, panel in shares.items():
-        for row_key in panel:
-            for k, label in enumerate(labels):
-                hits = [r["critical_up"] == "True" for r in rows if r["source"] == label and row_key == (
-                    float(r["torque"]), float(r["friction"])) and panel_key == (r["configuration"], float(r["height"]))]
-                panel[row_key][k] = float(np.mean(hits)) if hits else math.nan
+        panel = hits.setdefault((r["configuration"], float(r["height"])), {})
+        cells = panel.setdefault((float(r["torque"]), float(r["friction"])), [[] for _ in labels])
+        cells[labels.index(r["source"])].append(r["critical_up"] == "True")
+    shares = {key: {row: [float(np.mean(c)) if c else math.nan for c in cells] for row, cells in sorted(panel.items())}
+              for key, panel in sorted(hits.items(), key=lambda item: (item[0][0] != "lateral", item[0]))}
     return phase_map_figure(shares, [float(v) for v in labels])
 
 
-def endings() -> Figure | None:
-    rows = closed_loop.kept(OUT / "closed_loop_mujoco_trials.csv")
+def endings(engine: str) -> Figure | None:
+    """How approaches end under control in one engine; None without its trials."""
+    rows = closed_loop.kept(OUT / f"closed_loop_{engine}_trials.csv")
     found = {name: np.array([(r.position, r.yaw, r.phase) for r in rows if r.control == name and not r.exploded])
              for name in closed_loop.SETTINGS}
     found = {name: values for name, values in found.items() if len(values)}
     return endings_figure(found, {n: closed_loop.SETTINGS[n][2] for n in found}) if found else None
 
 
-def all_figures(quick: bool, actuator: dict[str, float | bool]) -> Iterator[tuple[str, Figure]]:
-    """(file name, figure) of everything there are data for."""
-    from_files: tuple[tuple[str, Callable[[], Figure | None]], ...] = (
-        ("climb_rates.png", climb_rates), ("phase_map.png", phase_map), ("closed_loop.png", endings))
-    for name, draw in from_files:
-        figure = draw()
-        if figure is not None:
-            yield name, figure
-    yield "searches.png", searches(quick, actuator)
-    yield "pso_costs.png", costs(quick)
-    yield from motions(quick)
+def from_files() -> Iterator[tuple[str, Figure]]:
+    """(file name, figure) of everything there are trial files for."""
+    cells = climb_cells()
+    if cells:
+        yield "climb_rates.png", climb_rates_figure(cells)
+    for engine in ("mujoco", "pybullet"):
+        for name, figure in ((f"phase_map_{engine}.png", phase_map(engine)),
+                             (f"closed_loop_{engine}.png", endings(engine))):
+            if figure is not None:
+                yield name, figure
+
+
+def wheel_and_set_ups() -> Iterator[tuple[str, Figure]]:
+    """The wheel at the step, and where the scenarios start."""
+    yield "cam.png", cam_figure(DEFAULT_WHEEL, FITTED_WHEEL)
+    yield "geometry_5cm.png", geometry_figure(DEFAULT_WHEEL, 0.05)
+    yield "figure_6_9.png", wheel_at_step_figure(DEFAULT_WHEEL, math.radians(-35), math.radians(-30), LOW_STEP)
+    numbers = {1: "6.3", 2: "6.10"}
+    yield "set_ups.png", setups_figure([
+        (f"{numbers[n]}: scenario {n}", load_maneuver(PROBLEMS / "smdw" / file), TARGETS[n])
+        for n, file in SCENARIOS.items()])

@@ -1,55 +1,54 @@
-"""The SMDW thesis's tables beside our own runs: `python -m benchmarks.smdw_tables [--quick]`.
+"""The SMDW thesis's tables and figures beside our own runs: `python -m benchmarks.smdw_tables [--quick]`.
 
 Thesis, our re-run of its PSO (same options, sound actuator model), our exact planner; where they differ the page says
-why. Climb counts come from `python -m benchmarks.climb`, control from `python -m benchmarks.closed_loop`.
+why. Climb counts come from the trial files of `python -m benchmarks.climb` and `benchmarks.smdw_printed`, control from
+`python -m benchmarks.closed_loop`.
 """
 
 from __future__ import annotations
 
 import argparse
-import csv
 import math
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from benchmarks.climb import approach_command, plan_of, step_scene
-from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
-from benchmarks.smdw_figures import all_figures
-from trajopt.maneuver import configurations, plan_climb
+from benchmarks import smdw_printed
+from benchmarks.climb import NAMES
+from benchmarks.common import OUT, PROBLEMS, ResultTable, provenance, publish
+from benchmarks.smdw_figures import TARGETS, Driven, climb_cells, driven, from_files, motions, wheel_and_set_ups
+from benchmarks.smdw_page import PACKAGES, Page, headline, orders
+from benchmarks.smdw_printed import TABLES as TABLES_6
+from benchmarks.smdw_printed import read
+from benchmarks.smdw_searches import (
+    BETA,
+    FIRST_BETA,
+    FIRST_GAINS,
+    GAINS,
+    PSO,
+    Swarms,
+    scenario_searches,
+    search_5_3,
+    searches,
+    swarms,
+)
+from trajopt.maneuver import plan_climb
 from trajopt.maneuver_problem import load_maneuver
 from trajopt.objectives.terminal import folded, terminal_cost, terminal_objective
 from trajopt.optimize.search import minimize
 from trajopt.problem import WHEELS, Problem, load_problem
-from trajopt.report.smdw import cam_figure, geometry_figure, plans_figure
+from trajopt.report.smdw import plans_figure
 from trajopt.report.style import in_style, save_figure
 from trajopt.robots.smdw import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
 from trajopt.robots.smdw_geometry import contact_offset
-from trajopt.simulate.climb import run_approach
 
 Array = NDArray[np.float64]
 
-DATA = Path(__file__).parent / "data" / "smdw"
-PICTURES = OUT / "smdw_tables"
-GAINS, BETA = np.array([3.0, 0.125, 2.5]), 12.5  # Table 5.8
-FIRST_GAINS, FIRST_BETA = np.array([1.0, 0.125, 1.0]), 10.0  # Figures 5.15-5.18
 FIRST_GOAL = (2.0, 0.75, math.pi / 2)  # m, m, rad: Table 5.3
-# rad/s, fitted to Table 5.5 (loosely): what the thesis's drives seem to have done
-ACTUATOR: dict[str, float | bool] = {"actuator.enabled": True, "actuator.saturation": 43.0, "actuator.dead_zone": 2.8}
 EXACT = 1e-6  # cost up to which a search counts as exact
 SEARCH_COLUMNS = ("thesis", "recomputed from its deviations", "its PSO, re-run", "exact (P1, P2, heading free)")
-TABLES_6 = {"lateral left": "table_6_2_lateral", "forward -35 deg": "table_6_3_forward35",
-            "forward -45 deg": "table_6_4_forward45"}
-TARGETS_6 = {"lateral left": (2.46, 0.76, -math.pi / 2), "forward -35 deg": (2.2, 0.76, -0.611),
-             "forward -45 deg": (2.2, 0.76, -math.pi / 4)}  # Table 6.1, m, m, rad
-
-
-def read(name: str) -> list[dict[str, str]]:
-    """Rows of a data file; lines that start with # are its sources."""
-    lines = (DATA / f"{name}.csv").read_text(encoding="utf-8").splitlines()
-    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
 
 
 def printed_cost(row: dict[str, str]) -> float:
@@ -59,18 +58,9 @@ def printed_cost(row: dict[str, str]) -> float:
     return terminal_cost(pose, wheels, GAINS, np.array([0.0, BETA, 0.0, BETA]))
 
 
-def searched(duration: float, optimizer: str, seed: int) -> float:
-    """Cost, without grid error, on the problem of Table 5.3 through the actuators."""
-    problem = load_problem(PROBLEMS / "smdw" / "table_5_3.toml", {"spline.duration": duration, **ACTUATOR})
-    if optimizer == "lattice":
-        problem = problem.replace({"spline.free": ["p1", "p2", "heading"]})
-    objective = terminal_objective(problem)
-    return minimize(objective, objective.bounds, optimizer=optimizer, seed=seed).fun
-
-
 def _search_row(first: str, row: dict[str, str], duration: float, seed: int) -> tuple[str, ...]:
-    exact = searched(duration, "lattice", seed)
-    return (first, row["cost"], f"{printed_cost(row):.4f}", f"{searched(duration, 'pso-thesis-enhanced', seed):.4g}",
+    exact, pso = (search_5_3(duration, name, seed)[1].fun for name in ("lattice", PSO))
+    return (first, row["cost"], f"{printed_cost(row):.4f}", f"{pso:.4g}",
             f"{exact:.0e}" if exact < EXACT else f"none (best {exact:.2g})")
 
 
@@ -86,41 +76,37 @@ def table_5_6(quick: bool) -> ResultTable:
     return ResultTable("Table 5.6: ten searches at 1 s", ("test", *SEARCH_COLUMNS), rows)
 
 
-def figures_5_15() -> ResultTable:
-    """Costs printed under Figures 5.15-5.22, from the final states printed there."""
+def figures_5_15(found: Swarms) -> ResultTable:
+    """Costs printed under Figures 5.15-5.22, from the final states printed there, and of our re-runs."""
     rows = []
+    ours = {"first": iter(found.first), "enhanced": iter(found.enhanced)}
     for row in read("figures_5_15_to_5_22"):
         first = row["implementation"] == "first"
         final = np.array([float(row[k]) for k in ("xf_m", "yf_m", "psif_rad")])
         wheels = np.array([float(row[f"theta{i}_rad"]) for i in (1, 2, 3, 4)])
         gains = np.full(4, FIRST_BETA) if first else np.array([0.0, BETA, 0.0, BETA])
         cost = terminal_cost(final - np.array(FIRST_GOAL), wheels, FIRST_GAINS if first else GAINS, gains)
-        rows.append((row["figure"], row["implementation"], row["cost"], f"{cost:.4f}"))
-    return ResultTable("Figures 5.15-5.22: cost from the printed final states",
-                       ("figure", "implementation", "thesis", "recomputed"), rows)
+        rerun = next(ours[row["implementation"]], None)
+        rows.append((row["figure"], row["implementation"], row["cost"], f"{cost:.4f}",
+                     "not run" if rerun is None else f"{rerun:.4g}"))
+    return ResultTable("Figures 5.15-5.22: cost from the printed final states, and of the same search re-run",
+                       ("figure", "implementation", "thesis", "recomputed", "re-run"), rows)
 
 
-def tables_6(trials: int) -> ResultTable:
+def tables_6(runs: Mapping[str, Driven]) -> ResultTable:
     """Final errors after open-loop execution in physics, scenario 1: mean and standard deviation."""
-    problem = load_maneuver(PROBLEMS / "smdw" / "step_5cm.toml")
     rows = []
-    for configuration in configurations(problem.robot.wheel, problem.obstacle):
-        if configuration.name not in TABLES_6:
-            continue
-        printed = read(TABLES_6[configuration.name])
+    for name, run in runs.items():
+        printed = read(TABLES_6[name])
         thesis = np.array([[float(r[k]) for k in ("xf_m", "yf_m", "psif_rad")] for r in printed])
-        shown = [WHEELS.index(w) for w in configuration.critical]
+        shown = [WHEELS.index(w) for w in run.plan.configuration.critical]
         phases = np.array([[float(r[f"theta{i + 1}_rad"]) for i in shown] for r in printed])
-        plan, ours, wheels = plan_of(problem, configuration), [], []
-        for n in range(trials):
-            rng = np.random.default_rng([n, 11])
-            run = run_approach(step_scene(problem, float(rng.uniform(0.6, 1.0))), approach_command(problem, plan, rng))
-            ours.append(run.pose[-1] - np.array(plan.target.pose))
-            wheels.append([run.wheel_angles[-1][i] - plan.target.wheels[i] for i in shown])
-        for who, errors, turned in (("thesis", thesis - np.array(TARGETS_6[configuration.name]), phases),
-                                    ("exact plan, open loop", np.array(ours), np.array(wheels))):
+        ours = np.array([a.pose[-1] for a in run.approaches]) - np.array(run.plan.target.pose)
+        wheels = np.array([a.wheel_angles[-1][shown] for a in run.approaches]) - np.array(run.plan.target.wheels)[shown]
+        for who, errors, turned in (("thesis", thesis - np.array(TARGETS[1][NAMES[name]]), phases),
+                                    ("exact plan, open loop", ours, wheels)):
             worst = np.abs(folded(turned, 2 * math.pi))
-            rows.append((configuration.name, who, *(f"{m:+.3f} ({s:.3f})" for m, s in
+            rows.append((name, who, *(f"{m:+.3f} ({s:.3f})" for m, s in
                          zip(errors.mean(axis=0), errors.std(axis=0), strict=True)), f"{np.median(worst):.2f}"))
     return ResultTable("Tables 6.2-6.4: final error of sub-test 1, mean (standard deviation)",
                        ("configuration", "run", "x, m", "y, m", "yaw, rad", "median critical wheel error, rad"), rows)
@@ -139,63 +125,60 @@ def geometry() -> ResultTable:
                                           "forward alpha for 5 cm at theta 0, deg", "at any theta"), rows)
 
 
-def scenarios() -> tuple[ResultTable, list[str]]:
+def scenarios() -> tuple[ResultTable, list[tuple[str, Figure]]]:
     """The thesis's six searches (Tables 6.1, 6.6): its PSO re-run against the exact planner; pictures of the plans."""
     rows: list[tuple[str, ...]] = []
     pictures = []
     for number in (1, 2):
-        for name in ("lateral", "forward35", "forward45"):
-            file = PROBLEMS / "smdw" / f"scenario_{number}_{name}.toml"
-            rows.append((str(number), name, f"{_cost(load_problem(file, {'actuator.enabled': True})):.3g}"))
         problem = load_maneuver(PROBLEMS / "smdw" / ("step_5cm.toml" if number == 1 else "step_3_5cm.toml"))
         maneuver = plan_climb(problem)
         worst = max(p.wheel_error for p in maneuver.plans)
-        for i, row in enumerate(rows[-3:]):
-            rows[len(rows) - 3 + i] = (*row, f"{worst:.0e}", f"{maneuver.wall_time:.2f}")
-        pictures.append(_picture(f"scenario_{number}.png", plans_figure(maneuver)))
-    return ResultTable("Scenarios: cost of the thesis's PSO (re-run) and the exact planner's wheel error",
+        for name in ("lateral", "forward35", "forward45"):
+            file = PROBLEMS / "smdw" / f"scenario_{number}_{name}.toml"
+            rows.append((str(number), name, f"{_cost(load_problem(file, {'actuator.enabled': True})):.3g}",
+                         f"{worst:.0e}", f"{maneuver.wall_time:.2f}"))
+        pictures.append((f"scenario_{number}.png", plans_figure(
+            maneuver, f"Scenario {number} (set-up of Figure {'6.3' if number == 1 else '6.10'}): all exact plans; "
+                      "dashed: the space, dots: control points")))
+    return ResultTable("Tables 6.1, 6.6: cost of the thesis's PSO (re-run) and the exact planner's wheel error",
                        ("scenario", "configuration", "PSO's cost", "worst wheel error of all our plans, rad",
                         "time for all plans, s"), rows), pictures
 
 
 def _cost(problem: Problem) -> float:
     objective = terminal_objective(problem)
-    return minimize(objective, objective.bounds, optimizer="pso-thesis-enhanced", seed=0).fun
+    return minimize(objective, objective.bounds, optimizer=PSO, seed=0).fun
 
 
-def _picture(name: str, figure: object) -> str:
-    from matplotlib.figure import Figure
-
-    assert isinstance(figure, Figure)
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    save_figure(figure, PICTURES / name)
-    return f"![{name}](smdw_tables/{name})"
+def _saved(folder: str, pictures: Iterable[tuple[str, Figure]]) -> list[str]:
+    """Names of the pictures, written into ``folder`` as they come."""
+    names = []
+    (OUT / folder).mkdir(parents=True, exist_ok=True)
+    for name, figure in pictures:
+        save_figure(figure, OUT / folder / name)
+        names.append(name)
+    return names
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="every fifth row, 2 trials")
     quick = parser.parse_args(arguments).quick
+    name = "smdw_tables" + ("_quick" if quick else "")
+    cells, printed = climb_cells(), smdw_printed.kept()
+    runs = {number: driven(number, 2 if quick else 10) for number in (1, 2)}
     with in_style():
-        made, pictures = scenarios()
-        pictures += [_picture(name, figure) for name, figure in all_figures(quick, ACTUATOR)]
-        pictures += [_picture("geometry_5cm.png", geometry_figure(DEFAULT_WHEEL, 0.05)),
-                     _picture("cam.png", cam_figure(DEFAULT_WHEEL, FITTED_WHEEL))]
-    tables = [geometry(), made, figures_5_15(), table_5_6(quick), table_5_5(quick), tables_6(2 if quick else 10)]
-    others = [path.read_text(encoding="utf-8") for path in sorted(OUT.glob("climb_*.md")) + sorted(OUT.glob(
-        "closed_loop_*.md")) if not path.stem.endswith("_quick")]
-    publish("smdw_tables" + ("_quick" if quick else ""), tables, packages=("numpy", "mujoco"), notes=[
-        "Tables 5.5, 5.6: saturation 43 rad/s and dead-zone 2.8 rad/s are inferred, so short intervals agree in kind "
-        "only. From T = 3 s on the table is not reproduced: the thesis prints 2.0-3.8, its PSO on a sound "
-        "actuator model finds less: its search stuck or its actuator differed. The exact planner may move P1 and the "
-        "heading, so its column is no like-for-like claim; where wheels saturate throughout it has no solution.",
-        "Contact offsets printed at 30 and 60 deg need Rc 10.29 and Re 5.54 cm, whose Rc - Re = 4.75 cm rules out the "
-        "5 cm step that the thesis climbs; the default keeps its rolling radius and takes Re so that 5 cm passes.",
-        "The forward range of alpha depends on hub depth and gap, which the thesis does not print, and on what counts "
-        "as the obstacle's area (its equations 4.7 and 4.8 are lost): here "
-        "the step is as near as the carrying hub lets it.",
-        "Tables 6.2-6.4: the thesis's wheels end far from their targets because drive lag and roller slip are not fed "
-        "back there; our wheels follow the command, and what is left is the pose.", *pictures, *others])
+        swarm = swarms(quick)
+        made, plans = scenarios()
+        pictures = _saved(name, [*from_files(), *wheel_and_set_ups(), ("swarms.png", swarm.figure),
+                                 ("searches.png", searches(quick)), *scenario_searches(quick), *plans,
+                                 *motions(runs, quick)])
+    tables = {"headline": headline(cells), "order": orders(cells)} if cells else {}
+    tables |= {"geometry": geometry(), "figures_5_15": figures_5_15(swarm), "table_5_6": table_5_6(quick),
+               "table_5_5": table_5_5(quick), "scenarios": made, "tables_6": tables_6(runs[1])}
+    tables |= {"printed": smdw_printed.table(printed)} if printed else {}
+    page = publish(name, list(tables.values()), packages=PACKAGES)
+    page.write_text(Page(provenance(PACKAGES), tables, name, pictures).text(), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
-"""Pictures of the SMDW's trials: climb rates, the phase map, closed-loop endings, motions, searches.
+"""Pictures of the SMDW's trials: climb rates, the phase map, closed-loop endings, motions.
 
-All take plain rows and arrays, so that any run of the trials can be drawn (Figures 5.23-5.25 and 6.4-6.13).
+All take plain rows and arrays, so that any run of the trials can be drawn (SMDW thesis, Figures 6.4-6.13).
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
 from trajopt.report.ground_plan import draw_robot
@@ -25,6 +24,10 @@ Array = NDArray[np.float64]
 
 _SOURCE_COLOURS = (BLUE, ORANGE, GREY, GREEN)
 _WIDE = 0.8  # share of the room of a group that its bars take
+_ROOM = 0.2  # share from which a bar holds its count, chosen
+_STEP_SHOWN = 0.15  # m, least depth of the step that is drawn, chosen
+_SPREAD = 0.5  # share of the room of a row over which its points are spread
+_LEAST = {"position (mm)": 0.1, "yaw (deg)": 0.01, "phase (rad)": 1e-4}  # smallest error drawn, chosen
 
 
 @dataclass(frozen=True)
@@ -48,16 +51,16 @@ def climb_rates_figure(cells: Sequence[ClimbCell]) -> Figure:
     engines = list(dict.fromkeys(c.engine for c in cells))
     heights = sorted({c.height for c in cells})
     sources = list(dict.fromkeys(c.source for c in cells))
-    figure = new_figure(2.5 * len(engines) + 0.5)
+    figure = new_figure(2.5 * len(engines) + 0.5, 8.4)
     grid = figure.subplots(len(engines), len(heights), squeeze=False, sharey=True)
     for row, engine in zip(grid, engines, strict=True):
         for ax, height in zip(row, heights, strict=True):
             here = [c for c in cells if (c.engine, c.height) == (engine, height)]
             _draw_rates(ax, here, sources)
-            ax.set_title(f"{engine}, {100 * height:g} cm")
-        row[0].set_ylabel("climbs / trials")
+            ax.set_title(f"{engine}, step of {100 * height:g} cm")
+        row[0].set_ylabel("leading wheels up, share")
     handles = [Line2D([], [], color=_SOURCE_COLOURS[i % 4], linewidth=6, label=s) for i, s in enumerate(sources)]
-    handles.append(Line2D([], [], color=VERMILION, marker="_", markersize=12, linestyle="", label="thesis"))
+    handles.append(Line2D([], [], color=VERMILION, linewidth=1.6, label="printed in the thesis"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
 
@@ -65,19 +68,28 @@ def climb_rates_figure(cells: Sequence[ClimbCell]) -> Figure:
 def _draw_rates(ax: Axes, cells: Sequence[ClimbCell], sources: Sequence[str]) -> None:
     names = list(dict.fromkeys(c.configuration for c in cells))
     width = _WIDE / max(len(sources), 1)
-    for cell in cells:
-        k = sources.index(cell.source)
-        x = names.index(cell.configuration) + (k - (len(sources) - 1) / 2) * width
-        share = cell.successes / cell.trials if cell.trials else 0.0
-        low, high = wilson(cell.successes, cell.trials)
-        ax.bar(x, share, 0.9 * width, color=_SOURCE_COLOURS[k % 4])
-        ax.errorbar(x, share, [[share - low], [high - share]], color=BLACK, linewidth=0.8, capsize=2)
-        if cell.thesis is not None:
-            for value in set(cell.thesis):
-                ax.plot(names.index(cell.configuration) + np.array([-0.5, 0.5]) * _WIDE, [value, value],
-                        color=VERMILION, linewidth=1.2)
+    for i, name in enumerate(names):
+        mine = {c.source: c for c in cells if c.configuration == name}
+        for k, source in enumerate(sources):
+            x = i + (k - (len(sources) - 1) / 2) * width
+            if source not in mine:
+                ax.text(x, 0.03, "not run", rotation=90, ha="center", va="bottom", fontsize=7, color=GREY)
+                continue
+            _draw_rate(ax, x, 0.9 * width, mine[source], _SOURCE_COLOURS[k % 4])
+        for value in {v for c in mine.values() if c.thesis is not None for v in c.thesis}:
+            ax.plot(i + np.array([-0.5, 0.5]) * _WIDE, [value, value], color=VERMILION, linewidth=1.6, clip_on=False,
+                    zorder=4)
     ax.set_xticks(range(len(names)), names)
     ax.set_ylim(0, 1.08)
+
+
+def _draw_rate(ax: Axes, x: float, width: float, cell: ClimbCell, colour: str) -> None:
+    share = cell.successes / cell.trials if cell.trials else 0.0
+    low, high = wilson(cell.successes, cell.trials)
+    ax.bar(x, share, width, color=colour)
+    ax.errorbar(x, share, [[share - low], [high - share]], color=BLACK, linewidth=0.8, capsize=2)
+    ax.text(x, 0.03, f"{cell.successes}/{cell.trials}", rotation=90, ha="center", va="bottom", fontsize=7,
+            color="white" if share > _ROOM else BLACK)
 
 
 def phase_map_figure(shares: Mapping[tuple[str, float], Mapping[tuple[float, float], Sequence[float]]],
@@ -87,37 +99,37 @@ def phase_map_figure(shares: Mapping[tuple[str, float], Mapping[tuple[float, flo
     ``shares``: for each panel and each (torque N m, friction) one share for each phase.
     """
     columns = list(dict.fromkeys(h for _, h in shares))
-    figure = new_figure(2.3 * math.ceil(len(shares) / len(columns)) + 0.4)
-    grid = figure.subplots(math.ceil(len(shares) / len(columns)), len(columns), squeeze=False)
+    rows_of_panels = math.ceil(len(shares) / len(columns))
+    figure = new_figure(2.3 * rows_of_panels + 0.4)
+    grid = figure.subplots(rows_of_panels, len(columns), squeeze=False)
     drawn = None
-    for ax, (panel, rows) in zip(grid.ravel(), sorted(shares.items()), strict=False):
+    for ax, (panel, rows) in zip(grid.ravel(), shares.items(), strict=False):
         values = np.array(list(rows.values()), dtype=np.float64)
         drawn = ax.imshow(values, aspect="auto", cmap="viridis", vmin=0, vmax=1, interpolation="nearest")
         ax.set_xticks(range(0, len(phases), 2), [f"{p:+.1f}" for p in phases[::2]])
         ax.set_yticks(range(len(rows)), [f"{torque:g} N m, \N{GREEK SMALL LETTER MU} {friction:g}"
                                          for torque, friction in rows])
-        ax.set(title=f"{panel[0]}, {100 * panel[1]:g} cm", xlabel="phase at contact (rad)")
+        ax.set(title=f"{panel[0]}, step of {100 * panel[1]:g} cm", xlabel="phase at contact (rad)")
         ax.grid(False)
     if drawn is not None:
-        figure.colorbar(drawn, ax=grid.ravel().tolist(), label="critical wheels up", shrink=0.6)
+        figure.colorbar(drawn, ax=grid.ravel().tolist(), label="critical wheels up, share of the runs", shrink=0.6)
     return figure
 
 
 def endings_figure(endings: Mapping[str, Array], bounds: Mapping[str, tuple[float, float, float]]) -> Figure:
     """Final errors (n, 3) of position (m), yaw (rad) and critical phase (rad) for each control, beside its bounds."""
-    figure = new_figure(3.4)
     names = list(endings)
-    for k, (ax, label, scale) in enumerate(zip(figure.subplots(1, 3), ("position (mm)", "yaw (deg)", "phase (rad)"),
-                                               (1e3, 180 / math.pi, 1.0), strict=True)):
+    figure = new_figure(0.55 * len(names) + 1.1, 8.4)
+    axes = figure.subplots(1, 3, sharey=True)
+    for k, (ax, label, scale) in enumerate(zip(axes, _LEAST, (1e3, 180 / math.pi, 1.0), strict=True)):
         for i, name in enumerate(names):
-            values = np.sort(np.maximum(scale * endings[name][:, k], 1e-4))
-            spread = i + 0.5 * (np.linspace(0, 1, len(values)) - 0.5)
-            ax.plot(spread, values, ".", color=(BLUE, SKY, ORANGE, VERMILION, PURPLE)[i % 5], markersize=3)
-            ax.plot([i - 0.35, i + 0.35], [scale * bounds[name][k]] * 2, color=BLACK, linewidth=1.2)
-        ax.set_yscale("log")
-        ax.set_xticks(range(len(names)), [n.replace(", ", "\n").replace(" and ", "\nand ") for n in names], rotation=0,
-                      fontsize=6.5)
-        ax.set_title(label)
+            values = np.sort(np.maximum(scale * endings[name][:, k], _LEAST[label]))
+            spread = i + _SPREAD * (np.linspace(0, 1, len(values)) - 0.5)
+            ax.plot(values, spread, ".", color=(BLUE, SKY, ORANGE, VERMILION, PURPLE)[i % 5], markersize=3)
+            ax.plot([scale * bounds[name][k]] * 2, [i - 0.35, i + 0.35], color=BLACK, linewidth=1.4)
+        ax.set(xscale="log", xlabel=label)
+    axes[0].set_yticks(range(len(names)), [f"{n}\n{len(endings[n])} trials" for n in names])
+    axes[0].invert_yaxis()
     return figure
 
 
@@ -125,13 +137,14 @@ def endings_figure(endings: Mapping[str, Array], bounds: Mapping[str, tuple[floa
 class Motions:
     """Simulated motions for one panel: ``poses`` a list of (N, 3), m and rad; ``good`` says which count as success.
 
-    ``target`` (3,) is the wanted end, ``edge`` (m) the x of the step's edge, None without a step.
+    ``ideal`` (N, 3) is the planned motion, None where there is none; ``edge`` the x (m) of the step's edge, None
+    for one that is not drawn.
     """
 
     title: str
     poses: Sequence[Array]
     good: Sequence[bool]
-    target: Array | None
+    ideal: Array | None
     edge: float | None
     note: str
 
@@ -139,50 +152,26 @@ class Motions:
 def motions_figure(panels: Sequence[Motions], robot: Platform, columns: int = 3) -> Figure:
     """Paths of the robot's centre from above with its last outline; successes blue, the others vermilion."""
     rows = math.ceil(len(panels) / columns)
-    figure = new_figure(2.7 * rows + 0.3, 8.4)
-    grid = np.atleast_1d(figure.subplots(rows, columns, squeeze=False)).ravel()
+    figure = new_figure(3.3 * rows + 0.3, 8.8)
+    grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
     for ax, panel in zip(grid, panels, strict=False):
         for pose, good in zip(panel.poses, panel.good, strict=True):
             ax.plot(pose[:, 0], pose[:, 1], color=BLUE if good else VERMILION, linewidth=0.8)
             draw_robot(ax, robot, pose[-1], colour=BLUE if good else VERMILION)
-        if panel.target is not None:
-            draw_robot(ax, robot, panel.target, colour=BLACK, strong=True)
+        if panel.ideal is not None:
+            ax.plot(panel.ideal[:, 0], panel.ideal[:, 1], color=BLACK, linewidth=1.2, linestyle="--")
+            draw_robot(ax, robot, panel.ideal[-1], colour=BLACK, strong=True)
+        ax.set(title=panel.title, xlabel=f"x (m)\n{panel.note}", aspect="equal")
+        ax.title.set_fontsize(8.5)
+    low, high = grid[0].get_xlim()  # of all panels: they share it
+    high = max(high, *(panel.edge + _STEP_SHOWN for panel in panels if panel.edge is not None), low)
+    for ax, panel in zip(grid, panels, strict=False):
         if panel.edge is not None:
-            low, high = ax.get_ylim()
-            x = panel.edge
-            ax.add_patch(Polygon([(x, low), (x + 3, low), (x + 3, high), (x, high)], color=LIGHT, zorder=0.3))
-            ax.set_ylim(low, high)
-            ax.set_xlim(ax.get_xlim()[0], max(ax.get_xlim()[1], x + 0.1))
-        ax.set(title=panel.title, xlabel=f"x (m)\n{panel.note}", ylabel="y (m)", aspect="equal")
-    for ax in grid[len(panels):]:
-        ax.set_axis_off()
-    return figure
-
-
-def searches_figure(groups: Sequence[tuple[str, Sequence[tuple[str, Array]]]], goal: Array) -> Figure:
-    """Paths (N, 2), m, that searches found: a panel a group, a labelled line a search (Figures 5.23-5.25)."""
-    from matplotlib import colormaps
-
-    figure = new_figure(3.6, 8.4)
-    for ax, (title, lines) in zip(figure.subplots(1, len(groups), squeeze=False, sharex=True, sharey=True).ravel(),
-                                  groups, strict=True):
-        for k, (label, path) in enumerate(lines):
-            colour = colormaps["viridis"](k / max(len(lines) - 1, 1))
-            ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.0, label=label)
-        ax.plot(*goal, "x", color=VERMILION)
-        ax.set(title=title, xlabel="x (m)", ylabel="y (m)", aspect="equal")
-        ax.legend(fontsize=6, ncols=2, loc="best")
-    return figure
-
-
-def costs_figure(panels: Sequence[tuple[str, Sequence[tuple[Array, Array]]]]) -> Figure:
-    """Best cost over iterations of several searches: panels of (iterations, cost) lines (Figures 6.5, 6.12)."""
-    figure = new_figure(2.4 * math.ceil(len(panels) / 3) + 0.2, 8.4)
-    grid = figure.subplots(math.ceil(len(panels) / 3), 3, squeeze=False, sharey=True).ravel()
-    for ax, (title, lines) in zip(grid, panels, strict=False):
-        for iterations, cost in lines:
-            ax.plot(iterations, np.maximum(cost, 1e-16), color=BLUE, linewidth=0.8, alpha=0.7)
-        ax.set(title=title, xlabel="iteration", ylabel="best cost", yscale="log")
+            ax.axvspan(panel.edge, high, color=LIGHT, zorder=0.3, linewidth=0)
+        ax.set_xlim(low, high)
+        ax.grid(visible=False)
+    for ax in grid[::columns]:
+        ax.set_ylabel("y (m)")
     for ax in grid[len(panels):]:
         ax.set_axis_off()
     return figure
