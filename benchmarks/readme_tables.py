@@ -1,17 +1,24 @@
 """Tables of README.md from the last benchmark runs: `python -m benchmarks.readme_tables`.
 
-Run first: `python -m benchmarks.optimizers`, `python -m benchmarks.time_scaling`,
-`python -m benchmarks.swarm_speed`. The tables stand between markers in README.md.
+Run first: `python -m benchmarks.optimizers`, `python -m benchmarks.time_scaling`, `python -m benchmarks.swarm_speed`,
+`python -m benchmarks.climb` with both engines, `python -m benchmarks.closed_loop`. The tables stand between markers in
+README.md.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+
+from benchmarks.climb import SOURCES, THESIS
+from benchmarks.closed_loop import SETTINGS
+from trajopt.simulate.climb import wilson
 
 README, RESULTS, WHOLE = Path("README.md"), Path("out/benchmarks"), Path("docs/optimizers.md")
 START, END = "<!-- tables: python -m benchmarks.readme_tables -->", "<!-- end of tables -->"
+CLIMBS, END_OF_CLIMBS = "<!-- climbs: python -m benchmarks.readme_tables -->", "<!-- end of climbs -->"
 
 
 def peers() -> list[str]:
@@ -70,12 +77,40 @@ def optimizers() -> list[str]:
             f"uncommitted changes. Every row: [{WHOLE}]({WHOLE})."]
 
 
+def climbs() -> list[str]:
+    """Share of climbs by what planned the wheel angles, both engines side by side; final errors with feedback."""
+    engines = ("mujoco", "pybullet")
+    trials = pd.concat([pd.read_csv(RESULTS / f"climb_{engine}_trials.csv") for engine in engines])
+    trials = trials[(trials["part"] == "planned") & ~trials["exploded"]]
+    lines = ["| step, cm | configuration | " + " | ".join(SOURCES) + " | thesis |", "|---|---|" + "---|" * 4]
+    for (height, name), cell in trials.groupby(["height", "configuration"], sort=False):
+        shares = ["; ".join(_share(cell[(cell["engine"] == e) & (cell["source"] == source)]["critical_up"])
+                            for e in engines) for source in SOURCES]
+        lines.append(f"| {100 * height:g} | {name} | {' | '.join(shares)} | {THESIS[name, height]} |")
+    lines += ["", "| control | within | of trials | position, mm | yaw, deg | wheel phase, rad |", "|---|" + "---|" * 5]
+    ended = pd.read_csv(RESULTS / "closed_loop_mujoco_trials.csv")
+    for control, (_, _, (position, yaw, phase)) in SETTINGS.items():
+        mine = ended[(ended["control"] == control) & ~ended["exploded"]]
+        good = ((mine["position"] <= position) & (mine["yaw"] <= yaw) & (mine["phase"] <= phase)).sum()
+        errors = [1e3 * mine["position"], np.degrees(mine["yaw"]), mine["phase"]]
+        bounds = f"{1e3 * position:g} mm, {np.degrees(yaw):g} deg, {phase:g} rad"
+        middle = " | ".join(f"{e.median():.2g} (worst {e.max():.2g})" for e in errors)
+        lines.append(f"| {control} | {bounds} | {good}/{len(ended[ended['control'] == control])} | {middle} |")
+    return lines
+
+
+def _share(up: pd.Series) -> str:
+    low, high = wilson(int(up.sum()), len(up))
+    return f"{up.sum()}/{len(up)} ({low:.2f}-{high:.2f})"
+
+
 def main() -> None:
     """Rewrite the tables in README.md."""
     text = README.read_text(encoding="utf-8")
-    before, rest = text.split(START)
-    after = rest.split(END)[1]
-    README.write_text("\n".join([before + START, "", *peers(), *optimizers(), END + after]), encoding="utf-8")
+    for start, end, lines in ((START, END, [*peers(), *optimizers()]), (CLIMBS, END_OF_CLIMBS, climbs())):
+        before, rest = text.split(start)
+        text = "\n".join([before + start, "", *lines, end + rest.split(end)[1]])
+    README.write_text(text, encoding="utf-8")
     print(f"wrote the tables of {README}")
 
 
