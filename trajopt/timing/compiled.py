@@ -19,6 +19,18 @@ def is_compiled() -> bool:
     return find_spec("numba") is not None
 
 
+def load_kernel() -> None:
+    """Load the compiled passes where numba is installed: about a second, once a process, which a caller that measures
+    its own time may want behind it. They are called on one interval of one metre."""
+    if not is_compiled():
+        return
+    from trajopt.timing import kernel
+
+    s, row, sets = np.array([0.0, 1.0]), np.ones((2, 1)), np.array([[0.0, 1.0], [0.0, 0.0]])
+    kernel.controllable(s, row, row, row, np.ones(2), sets)
+    kernel.fastest(s, row, row, row, sets, 0.0, np.empty(2))
+
+
 def compiled_profile(stages: Stages, start: float, end: float) -> Array:
     """(G,) s'^2 of the fastest profile with s'^2 = ``start`` and ``end`` at the ends.
 
