@@ -99,6 +99,7 @@ def next_motion(geometry: AsocGeometry, alpha: Array, before: Motion, wanted: Ar
         slip = (np.einsum("mwi,mi->mw", rows, found) - rolled).reshape(give.shape)
         pull = damping * slip
         size = np.linalg.norm(pull, axis=-1, keepdims=True)
+        # travel beyond what gives, over the largest force: 0 where friction holds
         sliding = np.linalg.norm(slip - give * pull / np.maximum(size / most, 1.0), axis=-1, keepdims=True) / most
         settled = (np.abs(found - state).max(axis=1) < SETTLED) & np.all(size <= OVER * most, axis=(1, 2, 3))
         state = np.where(done[:, None], state, found)  # a robot that is done stays so, whatever the others need
