@@ -181,7 +181,8 @@ def write(rows: Sequence[Row], folder: Path) -> None:
     lines = [
         "# Roller shapes in the simulators",
         "",
-        f"LOC8 over {DISTANCE:g} m, friction {Scene().friction:g}. " + "; ".join(conditions()),
+        f"LOC8 over {DISTANCE:g} m, friction {Scene().friction:g}. Spheres are the package's default. Real-time "
+        "factors are of wall time: other load lowers them. " + "; ".join(conditions()),
         "",
     ]
     for title, header, body in (

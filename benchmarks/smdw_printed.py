@@ -21,6 +21,7 @@ from benchmarks.climb import NAMES, THESIS
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from trajopt.maneuver import Configuration, configurations
 from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
+from trajopt.robots.loc8 import HALF_TRACK, HALF_WHEELBASE
 from trajopt.simulate.climb import Climb, Outcome, judge, record_climb, wilson
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.study.climb_trials import critical_wheels, four, step_scene
@@ -34,6 +35,7 @@ TABLES = {"lateral left": "table_6_2_lateral", "forward -35 deg": "table_6_3_for
 PRINTED_SPIN = {"lateral left": np.array([1.0, -1.0, -1.0, 1.0]), "forward -35 deg": np.ones(4),
                 "forward -45 deg": np.ones(4)}
 SET_YAW = -math.pi / 2  # rad, section 6.1.1: yaw put right by hand, lateral
+YAWS = ("as printed", "-90 deg", "-90 deg, as near as before")
 SET_YAW_THESIS = "10/10, 2 of them sliding"  # section 6.1.1, Figure 6.8
 FILE = OUT / "smdw_printed_trials.csv"
 NOTE = ("A wheel is up when its centre stays risen by 0.7 of the step's height. Friction 0.8, 8 N m. The place of the "
@@ -49,11 +51,12 @@ def read(name: str) -> list[dict[str, str]]:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Climbs of one configuration and step height (m) from its ten printed states; ``thesis`` is what it counted."""
+    """Climbs of one configuration and step height (m) from its ten printed states, with the ``yaw`` printed or set;
+    ``thesis`` is what it counted."""
 
     configuration: str
     height: float
-    yaw_set: bool
+    yaw: str
     climbs: list[Climb]
     thesis: str
 
@@ -71,10 +74,18 @@ def groups() -> Iterator[Group]:
         name = NAMES[configuration.name]
         for height in HEIGHTS:
             climbs = [printed_climb(problem, configuration, row, height) for row in read(TABLES[configuration.name])]
-            yield Group(configuration.name, height, False, climbs, THESIS[name, height].split(",")[0])
+            yield Group(configuration.name, height, YAWS[0], climbs, THESIS[name, height].split(",")[0])
             if configuration.motion.lateral and height == min(HEIGHTS):
                 turned = [replace(c, pose=(*c.pose[:2], SET_YAW)) for c in climbs]
-                yield Group(configuration.name, height, True, turned, SET_YAW_THESIS)
+                yield Group(configuration.name, height, YAWS[1], turned, SET_YAW_THESIS)
+                yield Group(configuration.name, height, YAWS[2], [moved_up(c) for c in climbs], "")
+
+
+def moved_up(climb: Climb) -> Climb:
+    """The yaw set right, and the robot moved so that its leading wheel's centre is as near to the step as before."""
+    x, y, yaw = climb.pose
+    before = HALF_WHEELBASE * abs(math.cos(yaw)) - HALF_TRACK * math.sin(yaw)  # ahead of the robot's centre
+    return replace(climb, pose=(x + before - HALF_TRACK, y, SET_YAW))
 
 
 def printed_climb(problem: ManeuverProblem, configuration: Configuration, row: dict[str, str], height: float) -> Climb:
@@ -122,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for engine, group in product(("mujoco",) if given.quick else given.engines, groups()):
         for number, (_, outcome) in enumerate(group.recorded(engine)):
             rows.append({"engine": engine, "configuration": group.configuration, "step_m": f"{group.height:g}",
-                         "yaw": "-90 deg" if group.yaw_set else "as printed", "thesis": group.thesis,
+                         "yaw": group.yaw, "thesis": group.thesis,
                          "number": str(number + 1), "critical_up": str(outcome.critical_up),
                          "all_up": str(outcome.all_up), "exploded": str(outcome.exploded)})
     if not given.quick:

@@ -41,7 +41,7 @@ def test_an_order_is_claimed_only_where_intervals_are_apart() -> None:
 
 def test_printed_states_keep_pose_and_phase_along_the_rotation() -> None:
     groups = list(smdw_printed.groups())
-    assert len(groups) == 7
+    assert len(groups) == 8
     assert all(len(g.climbs) == 10 for g in groups)
     lateral = groups[0].climbs[0]
     assert lateral.pose == (2.4113, 0.5327, -1.5152)
@@ -50,9 +50,14 @@ def test_printed_states_keep_pose_and_phase_along_the_rotation() -> None:
     assert lateral.wheels == pytest.approx((-5.0285, -4.7747, -1.1989, -2.4351))
     forward = next(g for g in groups if g.configuration == "forward -35 deg").climbs[0]
     assert forward.wheels == pytest.approx((0.6086, 1.7219, 2.0687, 6.1932))
-    turned = next(g for g in groups if g.yaw_set)
-    assert {c.pose[2] for c in turned.climbs} == {-math.pi / 2}
-    assert turned.height == 0.035
+    turned, near = (g for g in groups if g.yaw != "as printed")
+    assert {c.pose[2] for c in (*turned.climbs, *near.climbs)} == {-math.pi / 2}
+    assert turned.height == near.height == 0.035
+    left = np.array([[0.376, 0.316], [-0.376, 0.316]])  # wheel centres, m
+    for as_printed, moved in zip(groups[1].climbs, near.climbs, strict=True):
+        foremost = [c.pose[0] + float((left @ [math.cos(c.pose[2]), -math.sin(c.pose[2])]).max())
+                    for c in (as_printed, moved)]
+        assert foremost[0] == pytest.approx(foremost[1], abs=1e-9)
 
 
 def test_the_first_swarm_counts_all_four_wheels_with_the_gains_of_table_5_2() -> None:
