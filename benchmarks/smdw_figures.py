@@ -31,7 +31,7 @@ from trajopt.report.smdw_trials import (
 )
 from trajopt.robots.smdw import DEFAULT_WHEEL, FITTED_WHEEL, loc8_smdw
 from trajopt.simulate.climb import Climb, judge, reached, record_climb, run_approach
-from trajopt.simulate.engine import Recording
+from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.study.climb_trials import approach_command, step_scene
 
 Array = NDArray[np.float64]
@@ -140,11 +140,12 @@ def climb_cells() -> list[ClimbCell]:
                 item[0][0], item[0][1], list(NAMES.values()).index(item[0][2]), order.index(item[0][3])))]
 
 
-def phase_map(engine: str) -> Figure | None:
-    """Climbs over phase, torque and friction in one engine; None without its trials."""
+Shares = dict[tuple[str, float], dict[tuple[float, float], list[float]]]
+
+
+def phase_shares(engine: str) -> tuple[list[float], Shares]:
+    """Phases (rad), and the share that climbs at each, by configuration and step (m), torque (N m) and friction."""
     rows = [r for r in trial_rows("phases") if r["engine"] == engine]
-    if not rows:
-        return None
     labels = sorted({r["source"] for r in rows}, key=float)
     hits: dict[tuple[str, float], dict[tuple[float, float], list[list[bool]]]] = {}
     for r in rows:
@@ -153,7 +154,13 @@ def phase_map(engine: str) -> Figure | None:
         cells[labels.index(r["source"])].append(r["critical_up"] == "True")
     shares = {key: {row: [float(np.mean(c)) if c else math.nan for c in cells] for row, cells in sorted(panel.items())}
               for key, panel in sorted(hits.items(), key=lambda item: (item[0][0] != "lateral", item[0]))}
-    return phase_map_figure(shares, [float(v) for v in labels])
+    return [float(v) for v in labels], shares
+
+
+def phase_map(engine: str) -> Figure | None:
+    """Climbs over phase, torque and friction in one engine; None without its trials."""
+    phases, shares = phase_shares(engine)
+    return phase_map_figure(shares, phases) if shares else None
 
 
 def endings(engine: str) -> Figure | None:
@@ -170,7 +177,7 @@ def from_files() -> Iterator[tuple[str, Figure]]:
     cells = climb_cells()
     if cells:
         yield "climb_rates.png", climb_rates_figure(cells)
-    for engine in ("mujoco", "pybullet"):
+    for engine in ENGINES:
         for name, figure in ((f"phase_map_{engine}.png", phase_map(engine)),
                              (f"closed_loop_{engine}.png", endings(engine))):
             if figure is not None:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from benchmarks.common import OUT, ResultTable, markdown
-from benchmarks.smdw_figures import SOURCE_NAMES
+from benchmarks.smdw_figures import SOURCE_NAMES, phase_shares
 from trajopt.report.smdw_trials import ClimbCell
 from trajopt.simulate.climb import wilson
 
+CLIMBS = 0.5  # share of its runs from which a phase counts as one that climbs, chosen
 PACKAGES = ("numpy", "mujoco", "pybullet")
 THESIS_COUNTS = {("lateral", 0.035): "4/10, 2/10", ("forward", 0.035): "most of 20, 20/20", ("lateral", 0.05): "0/10",
                  ("forward", 0.05): "10-11/20"}  # sections 6.1.1 and 6.2; section 6.1
@@ -86,7 +87,9 @@ NOTES = {
                "leading wheel stands 2-5 cm farther back and meets the step up to 0.5 rad later, past the end of the "
                "window at 0.5 rad. Moved up by as much, it climbs as before. So here it is the phase at contact that "
                "counts, not the yaw; a centimetre more or less of the edge, whose place is inferred, is 0.1 rad.",
-    "phases": "One row a wheel torque and friction. Phase decides where a row is neither full nor empty.",
+    "phases": "A climb: both critical wheels up. One row of a picture is a wheel torque and friction; phase decides "
+              "where a row is neither full nor empty. With torque to spare and little friction wheels spin until the "
+              "phase fits; with little torque few phases climb.",
 }
 
 
@@ -111,7 +114,9 @@ class Page:
                  *self.shown("cost_maps", "pso_costs"), NOTES["cost_maps"], *self.shown("scenario_"),
                  "## Sub-test 1", *self.table("tables_6"), NOTES["sub_test_1"], *self.shown("sub_test_1"),
                  "## Sub-test 2", *self.shown("sub_test_2", "figure_6_7", "figure_6_8"), *self.table("printed"),
-                 NOTES["printed"], "## When phase decides", NOTES["phases"], *self.shown("phase_map"),
+                 NOTES["printed"], "## When phase decides", NOTES["phases"],
+                 *(self.shown("phase_map") or ["Not run yet: `python -m benchmarks.climb --parts phases`."]),
+                 *self.table("phases"),
                  "## Closed loop", *self.shown("closed_loop"), *other_pages()]
         return "\n\n".join(parts) + "\n"
 
@@ -177,6 +182,24 @@ def orders(cells: Sequence[ClimbCell]) -> ResultTable:
         rows.append((engine, f"{100 * height:g}", *found, thesis))
     return ResultTable("Order of the configurations (> where the intervals do not overlap)",
                        ("engine", "step, cm", *SOURCE_NAMES.values(), "thesis"), rows)
+
+
+def regimes(engines: Sequence[str]) -> ResultTable:
+    """Where phase decides: how many phases climb (in at least half of their runs) at each torque and friction."""
+    rows: list[tuple[str, ...]] = []
+    for engine in engines:
+        phases, panels = phase_shares(engine)
+        for (name, height), panel in panels.items():
+            found: dict[str, list[str]] = {"all": [], "some": [], "none": []}
+            for (torque, friction), shares in panel.items():
+                good = sum(share >= CLIMBS for share in shares)
+                kind = "all" if good == len(phases) else "some" if good else "none"
+                text = f"{torque:g} N m, {friction:g}" + (f" ({good} of {len(phases)})" if kind == "some" else "")
+                found[kind].append(text)
+            rows.append((engine, name, f"{100 * height:g}", *("; ".join(v) or "-" for v in found.values())))
+    header = ("engine", "configuration", "step, cm", "every phase climbs", "phase decides (phases that climb)",
+              "none climbs")
+    return ResultTable("Torques and frictions at which phase decides", header, rows)
 
 
 def ordered(counts: Mapping[str, tuple[int, int]]) -> str:

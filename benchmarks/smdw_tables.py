@@ -19,7 +19,7 @@ from benchmarks import smdw_printed
 from benchmarks.climb import NAMES
 from benchmarks.common import OUT, PROBLEMS, ResultTable, provenance, publish
 from benchmarks.smdw_figures import TARGETS, Driven, climb_cells, driven, from_files, motions, wheel_and_set_ups
-from benchmarks.smdw_page import PACKAGES, Page, headline, orders
+from benchmarks.smdw_page import PACKAGES, Page, headline, orders, regimes
 from benchmarks.smdw_printed import TABLES as TABLES_6
 from benchmarks.smdw_printed import read
 from benchmarks.smdw_searches import (
@@ -43,6 +43,7 @@ from trajopt.report.smdw import plans_figure
 from trajopt.report.style import in_style, save_figure
 from trajopt.robots.smdw import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
 from trajopt.robots.smdw_geometry import contact_offset
+from trajopt.simulate.engine import ENGINES
 
 Array = NDArray[np.float64]
 
@@ -177,6 +178,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     tables |= {"geometry": geometry(), "figures_5_15": figures_5_15(swarm), "table_5_6": table_5_6(quick),
                "table_5_5": table_5_5(quick), "scenarios": made, "tables_6": tables_6(runs[1])}
     tables |= {"printed": smdw_printed.table(printed)} if printed else {}
+    decided = regimes(ENGINES)
+    tables |= {"phases": decided} if decided.rows else {}
     page = publish(name, list(tables.values()), packages=PACKAGES)
     page.write_text(Page(provenance(PACKAGES), tables, name, pictures).text(), encoding="utf-8")
 

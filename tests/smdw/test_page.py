@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks import smdw_page, smdw_printed, smdw_searches
+from benchmarks import smdw_figures, smdw_page, smdw_printed, smdw_searches
 from trajopt.objectives.terminal import terminal_cost
 from trajopt.report.smdw_trials import ClimbCell
 
@@ -37,6 +37,18 @@ def test_an_order_is_claimed_only_where_intervals_are_apart() -> None:
     assert smdw_page.ordered({"a": (2, 20), "b": (20, 20), "c": (19, 20)}) == "b ~ c > a"
     assert smdw_page.ordered({"a": (10, 10), "b": (20, 20)}) == "a = b"
     assert smdw_page.ordered({}) == "not run"
+
+
+def test_phase_decides_where_some_phases_climb(monkeypatch: pytest.MonkeyPatch) -> None:
+    def row(torque: str, phase: str, up: bool) -> dict[str, str]:
+        return {"engine": "mujoco", "configuration": "lateral", "height": "0.05", "torque": torque, "friction": "0.8",
+                "source": phase, "critical_up": str(up)}
+
+    rows = [row("8.0", p, True) for p in ("-0.60", "+0.60")] + [row("2.0", p, False) for p in ("-0.60", "+0.60")]
+    rows += [row("4.0", "-0.60", up) for up in (True, True, False)] + [row("4.0", "+0.60", False)]
+    monkeypatch.setattr(smdw_figures, "trial_rows", {"phases": rows}.__getitem__)
+    (found,) = smdw_page.regimes(["mujoco", "pybullet"]).rows
+    assert found == ("mujoco", "lateral", "5", "8 N m, 0.8", "4 N m, 0.8 (1 of 2)", "2 N m, 0.8")
 
 
 def test_printed_states_keep_pose_and_phase_along_the_rotation() -> None:
