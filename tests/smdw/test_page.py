@@ -49,6 +49,10 @@ def test_phase_decides_where_some_phases_climb(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(smdw_figures, "trial_rows", {"phases": rows}.__getitem__)
     (found,) = smdw_page.regimes(["mujoco", "pybullet"]).rows
     assert found == ("mujoco", "lateral", "5", "8 N m, 0.8", "4 N m, 0.8 (1 of 2)", "2 N m, 0.8")
+    drawn = smdw_figures.phase_map("mujoco")
+    assert drawn is not None
+    assert np.asarray(drawn.axes[0].get_images()[0].get_array()) == pytest.approx(np.array([[0, 0], [2 / 3, 0], [1, 1]]))
+    assert smdw_figures.phase_map("pybullet") is None
 
 
 def test_printed_states_keep_pose_and_phase_along_the_rotation() -> None:
