@@ -95,16 +95,18 @@ NOTES = {
 
 @dataclass(frozen=True)
 class Page:
-    """Everything the page shows: ``where`` it ran, tables by name, and pictures made in ``folder``."""
+    """Everything the page shows: ``where`` it ran, climbs, tables by name, and pictures made in ``folder``."""
 
     where: str
+    cells: Sequence[ClimbCell]
     tables: Mapping[str, ResultTable]
     folder: str
     pictures: Sequence[str]
 
     def text(self) -> str:
         parts = ["# The SMDW thesis beside our own runs", self.where, "## How often planned approaches climb",
-                 *self.shown("climb_rates"), HEADLINE, *self.table("headline"), *self.table("order"), WHY_CLIMB,
+                 *self.shown("climb_rates"), HEADLINE, *self.table("headline"), reading(self.cells),
+                 *self.table("order"), WHY_CLIMB,
                  "## What stands for what", *markdown_block(correspondence()),
                  "## Wheel", *self.table("geometry"), NOTES["geometry"], *self.shown("cam", "geometry_5cm"),
                  *self.shown("figure_6_9"), NOTES["figure_6_9"],
@@ -148,19 +150,39 @@ def line_up(text: str) -> str:
     return "\n".join("#" + line if line.startswith("#") else line for line in text.strip().splitlines())
 
 
+def pooled(cells: Sequence[ClimbCell]) -> dict[tuple[str, float, str], dict[str, tuple[int, int]]]:
+    """(climbs, trials) of each planner, by engine, step (m) and motion; forward configurations together."""
+    found: dict[tuple[str, float, str], dict[str, tuple[int, int]]] = {}
+    for cell in cells:
+        line = found.setdefault((cell.engine, cell.height, cell.configuration.rstrip("0123456789")), {})
+        good, trials = line.get(cell.source, (0, 0))
+        line[cell.source] = (good + cell.successes, trials + cell.trials)
+    return found
+
+
 def headline(cells: Sequence[ClimbCell]) -> ResultTable:
     """Climbs of the three planners, forward configurations pooled, beside the thesis's counts."""
     rows = []
-    for engine, height in dict.fromkeys((c.engine, c.height) for c in cells):
-        for motion in ("lateral", "forward"):
-            shares = []
-            for source in SOURCE_NAMES.values():
-                mine = [c for c in cells if (c.engine, c.height, c.source) == (engine, height, source)
-                        and c.configuration.startswith(motion)]
-                shares.append(_share(sum(c.successes for c in mine), sum(c.trials for c in mine)))
-            rows.append((engine, f"{100 * height:g}", motion, *shares, THESIS_COUNTS[motion, height]))
+    for (engine, height, motion), line in pooled(cells).items():
+        shares = [_share(*line.get(source, (0, 0))) for source in SOURCE_NAMES.values()]
+        rows.append((engine, f"{100 * height:g}", motion, *shares, THESIS_COUNTS[motion, height]))
     return ResultTable("Climbs of trials, forward at 35 and 45 deg together",
                        ("engine", "step, cm", "motion", *SOURCE_NAMES.values(), "thesis"), rows)
+
+
+def reading(cells: Sequence[ClimbCell]) -> str:
+    """In words: in which lines of the headline the intervals of exact planning and of each other planner are apart."""
+    exact, *others = SOURCE_NAMES.values()
+    sentences = []
+    for other in others:
+        lines = {key: (line[exact], line[other]) for key, line in pooled(cells).items()
+                 if exact in line and other in line}
+        apart = [f"{engine}, {100 * height:g} cm, {motion} ({ours[0]}/{ours[1]} against {theirs[0]}/{theirs[1]})"
+                 for (engine, height, motion), (ours, theirs) in lines.items()
+                 if wilson(*ours)[0] > wilson(*theirs)[1] or wilson(*theirs)[0] > wilson(*ours)[1]]
+        where = "apart in no line" if not apart else "apart in " + "; ".join(apart)
+        sentences.append(f"Intervals of \"{exact}\" and \"{other}\" are {where}, of {len(lines)}.")
+    return " ".join(sentences)
 
 
 def _share(good: int, trials: int) -> str:

@@ -181,7 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     decided = regimes(ENGINES)
     tables |= {"phases": decided} if decided.rows else {}
     page = publish(name, list(tables.values()), packages=PACKAGES)
-    page.write_text(Page(provenance(PACKAGES), tables, name, pictures).text(), encoding="utf-8")
+    page.write_text(Page(provenance(PACKAGES), cells, tables, name, pictures).text(), encoding="utf-8")
 
 
 if __name__ == "__main__":

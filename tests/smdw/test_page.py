@@ -39,6 +39,13 @@ def test_an_order_is_claimed_only_where_intervals_are_apart() -> None:
     assert smdw_page.ordered({}) == "not run"
 
 
+def test_the_reading_names_the_lines_in_which_planners_differ() -> None:
+    text = smdw_page.reading(cells({("lateral", EXACT): 20, ("lateral", PSO): 19, ("lateral", UNIFORM): 5,
+                                    ("forward35", EXACT): 20, ("forward35", UNIFORM): 20}))
+    assert f'"{PSO}" are apart in no line, of 1.' in text
+    assert f'"{UNIFORM}" are apart in mujoco, 5 cm, lateral (20/20 against 5/20), of 2.' in text
+
+
 def test_phase_decides_where_some_phases_climb(monkeypatch: pytest.MonkeyPatch) -> None:
     def row(torque: str, phase: str, up: bool) -> dict[str, str]:
         return {"engine": "mujoco", "configuration": "lateral", "height": "0.05", "torque": torque, "friction": "0.8",
@@ -51,7 +58,8 @@ def test_phase_decides_where_some_phases_climb(monkeypatch: pytest.MonkeyPatch) 
     assert found == ("mujoco", "lateral", "5", "8 N m, 0.8", "4 N m, 0.8 (1 of 2)", "2 N m, 0.8")
     drawn = smdw_figures.phase_map("mujoco")
     assert drawn is not None
-    assert np.asarray(drawn.axes[0].get_images()[0].get_array()) == pytest.approx(np.array([[0, 0], [2 / 3, 0], [1, 1]]))
+    image = drawn.axes[0].get_images()[0]
+    assert np.asarray(image.get_array()) == pytest.approx(np.array([[0, 0], [2 / 3, 0], [1, 1]]))
     assert smdw_figures.phase_map("pybullet") is None
 
 
@@ -102,7 +110,7 @@ def test_every_picture_has_a_place_and_every_named_picture_exists(tmp_path: Path
     names = sorted({part.strip(" ,") for _, here, _ in smdw_page.CORRESPONDENCE for part in here.replace(";", ",")
                     .split(",") for part in part.split() if part.endswith(".png")})
     tables = {"headline": smdw_page.headline(cells({("lateral", EXACT): 1}))}
-    text = smdw_page.Page("here", tables, "folder", names).text()
+    text = smdw_page.Page("here", cells({("lateral", EXACT): 1}), tables, "folder", names).text()
     for name in names:
         assert text.count(f"![{name}](folder/{name})") == 1, name
     assert text.index("climb_rates.png") < text.index("Climbs of trials") < text.index("## What stands for what")
