@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import tomllib
 
 import jsonschema
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from smdw_problems import ROOT, SMDW, smdw_problem
 
-from trajopt.errors import ProblemError
+from trajopt.errors import ArgumentError, InfeasibleError, MissingDependencyError, ProblemError, SimulationError
 from trajopt.problem import load_problem, problem_schema
 
 
@@ -111,3 +112,14 @@ def test_schema_file_is_current_and_accepts_the_problems():
     schema = json.loads(text)
     for name in SMDW:
         jsonschema.validate(tomllib.loads((ROOT / f"problems/smdw/{name}.toml").read_text()), schema)
+
+
+@pytest.mark.parametrize("error", [
+    ArgumentError("speed", -1, "a speed > 0"), ProblemError("a.toml", "limits.speed", -1, "a speed > 0"),
+    InfeasibleError("slip", 1.5, "it is ice"), MissingDependencyError("mujoco", "simulate", "climbing"),
+    SimulationError("mujoco: it left physics")], ids=lambda e: type(e).__name__)
+def test_errors_come_back_from_worker_processes(error):
+    back = pickle.loads(pickle.dumps(error))
+    assert type(back) is type(error)
+    assert str(back) == str(error)
+    assert back.__dict__ == error.__dict__

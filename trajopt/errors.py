@@ -11,6 +11,16 @@ from numpy.typing import NDArray
 class TrajoptError(Exception):
     """Base of every error that trajopt raises on purpose."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Worker processes send errors by pickle, which would call the class with its message alone."""
+        return _restored, (type(self), self.args, dict(self.__dict__))
+
+
+def _restored(kind: type[TrajoptError], args: tuple[Any, ...], fields: dict[str, Any]) -> TrajoptError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(fields)
+    return error
+
 
 class ArgumentError(TrajoptError, ValueError):
     """A call got a value it cannot use.

@@ -27,6 +27,7 @@ from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
 from trajopt.problem import WHEELS, Problem, WheelName
+from trajopt.robots.platform import Platform
 from trajopt.robots.smdw import (
     LARGEST_FORWARD_ALPHA,
     Motion,
@@ -199,16 +200,12 @@ def approach_target(problem: ManeuverProblem, configuration: Configuration, *, p
     """
     c, robot, step = configuration, problem.platform, problem.obstacle
     phase = c.window.middle if phase is None else phase
-    cos, sin = math.cos(c.yaw), math.sin(c.yaw)
-    rotation = np.array([[cos, -sin], [sin, cos]])
-    normal = np.array(step.normal)
+    rotation, normal = _rotation(c.yaw), np.array(step.normal)
     motion = rotation @ c.direction
-    reach = collision_reach(problem.robot.wheel, phase, c.motion, c.alpha, step.height)
     corners = np.array(robot.footprint) @ rotation.T @ normal
     room = problem.approach.gap + float(corners.max())  # of the robot's centre, along the normal
-    places = {w: np.array([robot.wheels[i].l * math.cos(robot.wheels[i].alpha),
-                           robot.wheels[i].l * math.sin(robot.wheels[i].alpha)]) for i, w in enumerate(WHEELS)}
-    travel = [float((room - normal @ rotation @ places[w] - reach) / (normal @ motion)) for w in c.critical]
+    places = _wheel_places(robot)
+    travel = _travel(problem, c, room, c.yaw, phase)
     lead = rotation @ (places[c.critical[0]] + places[c.critical[1]]) / 2 if c.motion.lateral else \
         rotation @ places[c.critical[0]]
     along = np.array([-normal[1], normal[0]])
@@ -222,7 +219,37 @@ def approach_target(problem: ManeuverProblem, configuration: Configuration, *, p
         half_turn = 0.0 if name.endswith("left") == c.faces_left else math.pi  # the hub that faces the step counts
         wheels[i] = float(spin[i] * (phase - distance / problem.robot.wheel.radius)) + half_turn
     return Target((float(position[0]), float(position[1]), c.yaw), (wheels[0], wheels[1], wheels[2], wheels[3]),
-                  (travel[0], travel[1]))
+                  travel)
+
+
+def travel_to_step(problem: ManeuverProblem, configuration: Configuration,
+                   pose: tuple[float, float, float]) -> tuple[float, float]:
+    """What each critical wheel has left (m) from a pose along the motion until it meets the step in the middle of its
+    window."""
+    normal, place = np.array(problem.obstacle.normal), np.array(problem.obstacle.place)
+    return _travel(problem, configuration, float(normal @ (place - pose[:2])), pose[2], configuration.window.middle)
+
+
+def _travel(problem: ManeuverProblem, configuration: Configuration, room: float, yaw: float,
+            phase: float) -> tuple[float, float]:
+    """The same with the robot's centre ``room`` (m) before the step, for a ``phase`` (rad) of contact."""
+    c, normal, rotation = configuration, np.array(problem.obstacle.normal), _rotation(yaw)
+    reach = collision_reach(problem.robot.wheel, phase, c.motion, c.alpha, problem.obstacle.height)
+    places, ahead = _wheel_places(problem.platform), normal @ (rotation @ c.direction)
+    first, second = (float((room - normal @ rotation @ places[w] - reach) / ahead) for w in c.critical)
+    return first, second
+
+
+def _rotation(yaw: float) -> Array:
+    """(2, 2): body to world."""
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return np.array([[cos, -sin], [sin, cos]])
+
+
+def _wheel_places(robot: Platform) -> dict[WheelName, Array]:
+    """Where each wheel stands in the body (2,), m."""
+    return {w: np.array([robot.wheels[i].l * math.cos(robot.wheels[i].alpha),
+                         robot.wheels[i].l * math.sin(robot.wheels[i].alpha)]) for i, w in enumerate(WHEELS)}
 
 
 def search_problem(problem: ManeuverProblem, configuration: Configuration, target: Target) -> Problem:

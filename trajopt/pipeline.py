@@ -146,10 +146,10 @@ def validate(trajectory: Trajectory, problem: Problem, *, engine: str = "pybulle
              picture: bool = False, control: Mode | None = None, seed: int = 0) -> ValidationReport:
     """Drive a trajectory in a physics engine with real rollers, and measure how far it gets.
 
-    ``engine``: "pybullet" or "mujoco". ``control``: None drives the planned wheel speeds; "open loop", "pose" or "pose
-    and phase" switch on wheel servo, pose feedback, feedback of pose and critical wheel angles, with a pose
-    measured with noise drawn from ``seed``. Raises MissingDependencyError where the engine is not installed and
-    SimulationError where the simulation leaves physics.
+    ``engine``: "pybullet" or "mujoco". ``control``: None drives the planned wheel speeds; "wheel servo", "pose" or
+    "pose and phase" switch on a servo on the planned wheel angles, feedback of the pose, of the pose and the critical
+    wheel angles, with a pose measured with noise drawn from ``seed``. Raises MissingDependencyError where the engine
+    is not installed and SimulationError where the simulation leaves physics.
     """
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError("trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory has one)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from typer.testing import CliRunner
 
 from tests.study.crashes import ROOT
 from trajopt.cli import app
+from trajopt.control.approach import Sensors
 from trajopt.errors import ArgumentError
-from trajopt.maneuver import Plan, configurations, plan_configuration
+from trajopt.maneuver import Plan, configurations, plan_configuration, travel_to_step
 from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
 from trajopt.simulate.approach_run import Ending
 from trajopt.study.climb_trials import NEAREST, Scatter, approach_command, before_step, climb_trials
@@ -37,8 +39,9 @@ def plan(problem: ManeuverProblem) -> Plan:
 
 def test_feedback_ends_nearer_than_planned_speeds_and_numbers_repeat(problem: ManeuverProblem, plan: Plan) -> None:
     loose = climb_trials(problem, plan, (3,))[0]
-    seen: list[int] = []
-    steered = climb_trials(problem, plan, (3, 4), control="pose and phase", progress=seen.append)
+    seen: list[int] = []  # how many are done
+    steered = climb_trials(problem, plan, (3, 4), control="pose and phase",
+                           progress=lambda done: seen.append(len(done)))
     assert seen == [1, 2]
     assert steered[0].friction == loose.friction
     assert steered[0].ending.position < loose.ending.position
@@ -80,10 +83,31 @@ def test_a_climb_starts_before_the_step_whatever_its_direction(problem: Maneuver
         assert before_step(turned, away) == pytest.approx(tuple(away))
 
 
+def test_travel_to_the_step_is_the_target_s_there_and_shrinks_on_the_way(problem: ManeuverProblem, plan: Plan) -> None:
+    there = travel_to_step(problem, plan.configuration, plan.target.pose)
+    assert there == pytest.approx(plan.target.travel, abs=1e-12)
+    x, y, yaw = plan.target.pose
+    c, s = math.cos(yaw), math.sin(yaw)
+    back = np.array([[c, -s], [s, c]]) @ plan.configuration.direction * 0.1
+    farther = travel_to_step(problem, plan.configuration, (x - back[0], y - back[1], yaw))
+    assert np.subtract(farther, there) == pytest.approx([0.1, 0.1], abs=1e-12)
+
+
 def test_an_exploded_run_is_within_no_bounds() -> None:
     assert Ending(0.0, 0.0, 0.0, exploded=False).within(0.0, 0.0, 0.0)
     assert not Ending(0.0, 0.0, 0.0, exploded=True).within(1.0, 1.0, 1.0)
     assert not Ending(0.0, 0.1, 0.0, exploded=False).within(1.0, 0.05, 1.0)
+
+
+def test_errors_of_worker_processes_arrive_as_they_are(problem: ManeuverProblem, plan: Plan) -> None:
+    with pytest.raises(ArgumentError, match="pybullet"):
+        climb_trials(problem, plan, (0, 1), engine="magic", workers=2)
+
+
+@pytest.mark.parametrize("wrong", [{"position": -1.0}, {"yaw": math.nan}, {"friction": 3.0}])
+def test_a_scatter_that_is_none_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ArgumentError, match=next(iter(wrong))):
+        Scatter(**wrong)
 
 
 def test_no_trials_or_workers_are_refused(problem: ManeuverProblem, plan: Plan) -> None:
@@ -91,6 +115,12 @@ def test_no_trials_or_workers_are_refused(problem: ManeuverProblem, plan: Plan) 
         climb_trials(problem, plan, ())
     with pytest.raises(ArgumentError, match="workers"):
         climb_trials(problem, plan, (0,), workers=0)
+    with pytest.raises(ArgumentError, match="number"):
+        climb_trials(problem, plan, (-1,))
+    with pytest.raises(ArgumentError, match="sensors"):
+        climb_trials(problem, plan, (0,), sensors=Sensors())
+    with pytest.raises(ArgumentError, match="wheel servo"):
+        climb_trials(problem, plan, (0,), control="magic")  # type: ignore[arg-type]  # what a caller may misspell
 
 
 def test_the_command_writes_a_row_a_trial(tmp_path: Path) -> None:
@@ -101,6 +131,8 @@ def test_the_command_writes_a_row_a_trial(tmp_path: Path) -> None:
     with (tmp_path / "trials.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["number"] for row in rows] == ["7", "8"]
+    facts = json.loads((tmp_path / "trials.json").read_text())
+    assert (facts["control"], facts["configuration"], facts["engine"]) == ("pose", "lateral left", "mujoco")
     assert (tmp_path / "trials.png").stat().st_size > 10_000
 
 
@@ -109,7 +141,7 @@ def test_the_command_writes_a_row_a_trial(tmp_path: Path) -> None:
     (("--trials", "0"), ">= 1"),
     (("--configuration", "on its head"), "lateral left"),
     (("--engine", "magic"), "pybullet"),
-    (("--workers", "0"), "at least 1"),
+    (("--workers", "0"), ">= 1"),
 ])
 def test_what_the_command_refuses(arguments: tuple[str, str], words: str) -> None:
     done = CliRunner().invoke(app, ["climb", str(FILE), *arguments])

@@ -17,6 +17,7 @@ from trajopt.errors import ArgumentError
 
 if TYPE_CHECKING:
     from trajopt.maneuver import Maneuver, Plan
+    from trajopt.study.climb_trials import ClimbTrial
 
 
 def plan(problem: ProblemFile, set_: Overrides = None,
@@ -75,20 +76,33 @@ def climb(problem: ProblemFile, set_: Overrides = None,
     from trajopt.maneuver import plan_climb
     from trajopt.maneuver_problem import load_maneuver
     from trajopt.report.climb_trials import climb_trials_table, save_climb_trials_picture, write_climb_trials
+    from trajopt.report.files import made_folder
+    from trajopt.simulate.engine import make_engine
     from trajopt.study.climb_trials import climb_trials
 
-    for name, value, least in (("--trials", trials, 1), ("--first", first, 0)):
+    for name, value, least in (("--trials", trials, 1), ("--first", first, 0), ("--workers", workers, 1)):
         if value < least:
             raise ArgumentError(name, value, f"a whole number >= {least}")
     mode = control_mode(control)
+    make_engine(engine)  # an unknown one is refused before anything is planned, as is a folder that cannot be made
+    if out is not None:
+        made_folder(out)
     found = plan_climb(load_maneuver(problem, overrides(set_)))
     chosen = _chosen(found, configuration)
+    facts = {"problem": found.problem.source, "title": found.problem.title,
+             "configuration": chosen.configuration.name, "control": control, "engine": engine,
+             "command": " ".join(sys.argv)}
     with Bar(f"{engine}", trials) as bar:
+        def keep(done: list[ClimbTrial]) -> None:
+            """Nothing that is finished is lost when the rest is not."""
+            bar.count(len(done))
+            if out is not None:
+                write_climb_trials(done, out, facts)
+
         done = climb_trials(found.problem, chosen, range(first, first + trials), control=mode, engine=engine,
-                            workers=workers, progress=bar.count)
+                            workers=workers, progress=keep)
     console.print(climb_trials_table(done, f"{chosen.configuration.name} in {engine}, control: {control}"))
     if out is not None:
-        write_climb_trials(done, out)
         if pictures:
             save_climb_trials_picture(done, found.problem, chosen, out)
         console.print(f"written to {out}", highlight=False, soft_wrap=True)
@@ -100,5 +114,6 @@ def _chosen(maneuver: Maneuver, name: str | None) -> Plan:
         raise ArgumentError("problem", maneuver.problem.title, f"a manoeuvre with a plan; {maneuver.status}")
     plans = {plan.configuration.name: plan for plan in maneuver.plans}
     if name is not None and name not in plans:
-        raise ArgumentError("--configuration", name, "one that has a plan: " + ", ".join(plans))
+        why = "".join(f" ({name}: {r.reason})" for r in maneuver.refused if r.configuration.name == name)
+        raise ArgumentError("--configuration", name, "one that has a plan: " + ", ".join(plans) + why)
     return maneuver.plans[0] if name is None else plans[name]

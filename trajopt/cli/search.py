@@ -56,7 +56,7 @@ def solve(problem: ProblemFile,
 def validate(folder: Annotated[Path, typer.Argument(help="folder written by solve --out")],
              engine: Annotated[str, typer.Option(help="pybullet or mujoco")] = "pybullet",
              control: ControlOption = "none",
-             seed: Annotated[int, typer.Option(help="seed of the measured pose's noise")] = 0,
+             seed: Annotated[int, typer.Option(help="seed of the measured pose's noise, with --control")] = 0,
              pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True) -> None:
     """Drive a saved solution in a physics engine with real rollers and measure the deviation."""
     from trajopt.pipeline import validate as validate_trajectory

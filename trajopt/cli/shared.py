@@ -18,7 +18,7 @@ console = Console(width=None if sys.stdout.isatty() else 120)  # tables keep the
 
 FAULTY = 1
 # What can be switched on in a physics check; None drives the planned wheel speeds.
-CONTROLS: dict[str, Mode | None] = {"none": None, "servo": "open loop", "pose": "pose",
+CONTROLS: dict[str, Mode | None] = {"none": None, "servo": "wheel servo", "pose": "pose",
                                     "pose-and-phase": "pose and phase"}
 
 ProblemFile = Annotated[Path, typer.Argument(help="problem file (*.toml)", show_default=False)]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.random import Generator
@@ -23,14 +23,16 @@ from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import FreeGround
 
 Array = NDArray[np.float64]
-Mode = Literal["pose and phase", "pose", "open loop"]
+Mode = Literal["pose and phase", "pose", "wheel servo"]
 
 RESOLVE_EVERY = 0.1  # s between re-solves, from a prototype of this law; so are the next ones unless marked
 LAST_RESOLVE = 0.05  # s before the end from which on the reference stays, chosen: after the prototype's 0.3 s the
 # robot ended 3-4 mm off
 SERVO_GAIN = 10.0  # 1/s, of the wheel position servo
 ODOMETRY_NOISE = 0.06  # of the travel of a step, standard deviation: twice the 3 % of the simulators' error
-LEAST_TURN = math.radians(30.0)  # rad; with less turn the phase can hardly be corrected
+# rad, chosen: what a bend can do to the phase is proportional to the turn that is left
+LEAST_TURN = math.radians(30.0)
+START_SD = (0.01, 0.01, math.radians(1.0))  # m, m, rad: how well the start is known, standard deviations, chosen
 TOUCH_UP_AFTER = 0.1  # s at rest before the first correction on the spot (servo and filter have settled), chosen
 TOUCH_UP_TIME = 0.3  # s of one such correction, chosen
 TOUCH_UPS = 2  # corrections on the spot at most, chosen
@@ -108,10 +110,13 @@ class ApproachController:
     _touch_ups: int = 0
 
     def __post_init__(self) -> None:
+        if self.mode not in get_args(Mode):
+            raise ArgumentError("mode", self.mode, "one of " + ", ".join(get_args(Mode)))
         turn = abs(float(self.reference.pose[-1, 2] - self.reference.pose[0, 2]))
         if self.mode == "pose and phase" and turn < LEAST_TURN:
-            raise ArgumentError("trajectory", f"a turn of {math.degrees(turn):.1f} deg", "at least 30 deg of turn: "
-                                "with less, wheel phase cannot be corrected on the way (use mode 'pose')")
+            raise ArgumentError("trajectory", f"a turn of {math.degrees(turn):.1f} deg",
+                                f"at least {math.degrees(LEAST_TURN):.0f} deg of turn: with less, wheel phase cannot "
+                                "be corrected on the way (switch on feedback of the pose alone)")
 
     def step(self, t: float, pose: Array, wheels: Array) -> Array:
         """Wheel speeds (W,) at ``t`` (s). ``pose`` (3,): the true one, which the sensor blurs; ``wheels`` (W,), rad."""
@@ -123,7 +128,7 @@ class ApproachController:
             blur = self.rng.normal(0.0, 1.0, 3) * [s.position, s.position, s.yaw]
             self.estimate = correct(self.estimate, pose + blur, s)
             self._next_measurement += s.period
-        if self.mode != "open loop" and t >= self._next_solve - 1e-9:
+        if self.mode != "wheel servo" and t >= self._next_solve - 1e-9:
             self._next_solve += RESOLVE_EVERY
             left = self.reference.times[-1] - t
             if left > LAST_RESOLVE:
@@ -155,18 +160,20 @@ def approach_controller(trajectory: Trajectory, robot: Platform, wheels: Array, 
                         rng: Generator) -> ApproachController:
     """Controller for a planned trajectory that starts with measured wheel angles ``wheels`` (W,), rad.
 
-    ``goal_wheels`` (W,), rad: wanted at the end; None: what the plan makes of ``wheels``. ``ground``: where bent
-    paths keep the footprint; None: anywhere.
+    ``mode``: "wheel servo" holds the wheels on their planned angles, "pose" brings the pose to the goal, "pose and
+    phase" also the wheels ``critical`` (indices, 0 = front-left).
+    ``goal_wheels`` (W,), rad: wanted at the end; None: what the plan makes of ``wheels``. ``ground``: where bends
+    for the phase keep the footprint (feedback of the pose alone does not look at it); None: anywhere.
     ``cap``: wheel speed (rad/s) above which time is stretched; bringing the phase to the goal also takes a slower end
     (``TAIL_STRETCH``). The pose estimate starts at the plan's start with
-    a standard deviation of 1 cm and 1 deg. Raises ArgumentError for too little turn.
+    the standard deviations START_SD. Raises ArgumentError for too little turn.
     """
     reference = reference_of(trajectory, wheels)
     if mode == "pose and phase":
         reference = eased(reference, TAIL_STRETCH)
     wanted = reference.wheels[-1] if goal_wheels is None else goal_wheels
     goal = Goal(reference.pose[-1], wanted, critical, cap, ground)
-    start = Estimate(reference.pose[0], np.diag([0.01, 0.01, math.radians(1.0)]) ** 2)
+    start = Estimate(reference.pose[0], np.diag(START_SD) ** 2)
     return ApproachController(robot, reference, goal, start, Sensors() if sensors is None else sensors, mode, rng)
 
 

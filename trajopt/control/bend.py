@@ -108,7 +108,9 @@ def resolved(reference: Reference, t: float, estimate: Array, wheels: Array, goa
     """The reference from ``t`` (s) on, bent so that it starts at the estimate (3,) and ends at the goal.
 
     ``wheels`` (W,) are the measured angles. Without ``phase`` only the pose is brought to the goal. ``doubt`` (rad):
-    standard deviation of the wheel angles that the estimate's uncertainty amounts to; nothing below it is chased.
+    standard deviation of the wheel angles that the estimate's uncertainty amounts to; nothing below it is chased. Where
+    the bend needs wheels faster than the goal's cap, or finds no room on its ground, this path gives the phase up; the
+    next one, 100 ms later, tries again.
     """
     now, here = reference.at(t)
     ahead = reference.times > t + 1e-9

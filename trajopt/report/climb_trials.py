@@ -7,19 +7,24 @@ import io
 import math
 from collections.abc import Sequence
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
 
 from trajopt.maneuver import Plan
 from trajopt.maneuver_problem import ManeuverProblem
-from trajopt.report.files import made_folder, write_text
+from trajopt.report.files import made_folder, write_json, write_text
+from trajopt.report.provenance import commit, run_facts, versions
 from trajopt.simulate.climb import wilson
 from trajopt.study.climb_trials import ClimbTrial
 
-COLUMNS = ("number", "friction", "position_m", "yaw_rad", "phase_rad", "critical_up", "first_attempt", "all_up",
-           "exploded", "reason")
+Array = NDArray[np.float64]
+
+COLUMNS = ("number", "friction", "position_m", "yaw_rad", "phase_rad", "moved_back_m", "critical_up", "first_attempt",
+           "all_up", "exploded", "reason")
 
 
 def climb_trials_table(trials: Sequence[ClimbTrial], title: str) -> Table:
@@ -43,8 +48,9 @@ def climb_trials_table(trials: Sequence[ClimbTrial], title: str) -> Table:
     return table
 
 
-def write_climb_trials(trials: Sequence[ClimbTrial], folder: FilePath) -> FilePath:
-    """Write trials.csv into ``folder``, one row a trial; its path."""
+def write_climb_trials(trials: Sequence[ClimbTrial], folder: FilePath, facts: dict[str, Any]) -> FilePath:
+    """Write trials.csv, one row a trial, and trials.json (``facts``, versions, commit, machine) into ``folder``; the
+    path of trials.csv."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -52,26 +58,38 @@ def write_climb_trials(trials: Sequence[ClimbTrial], folder: FilePath) -> FilePa
         e, o = t.ending, t.outcome
         up = ("", "", "") if o is None else (o.critical_up, o.first_attempt, o.all_up)
         reason = t.approach.reason if o is None else o.reason
-        writer.writerow([t.number, t.friction, e.position, e.yaw, e.phase, *up, t.exploded, reason])
+        writer.writerow([t.number, t.friction, e.position, e.yaw, e.phase, t.moved_back, *up, t.exploded, reason])
     file = made_folder(folder) / "trials.csv"
     write_text(file, text.getvalue())
+    write_json(folder / "trials.json", {**facts, "versions": versions(), "commit": commit(), "run": run_facts()})
     return file
 
 
 def save_climb_trials_picture(trials: Sequence[ClimbTrial], problem: ManeuverProblem, plan: Plan,
                               folder: FilePath) -> FilePath:
-    """Draw approaches and climbs from above into trials.png; its path."""
+    """Draw approaches and climbs from above into trials.png; its path.
+
+    A step in another direction is drawn turned, so that its normal points along x. Runs that left physics are not
+    drawn.
+    """
     from trajopt.report.smdw_trials import Motions, motions_figure
     from trajopt.report.style import in_style, save_figure
 
-    edge = problem.obstacle.place[0] if problem.obstacle.direction == 0.0 else None  # drawn for steps along +x
-    planned = plan.trajectory.at(np.linspace(0.0, plan.duration, 200)).pose
-    climbs = [(t.climb.pose, t.outcome.critical_up) for t in trials if t.climb is not None and t.outcome is not None]
-    up = sum(good for _, good in climbs)
-    panels = [Motions(f"{plan.configuration.name}: approach", [t.approach.pose for t in trials],
-                      [not t.ending.exploded for t in trials], planned, edge, "dashed: the plan")]
-    if climbs:
-        panels.append(Motions("climb", [pose for pose, _ in climbs], [good for _, good in climbs], None, edge,
-                              f"blue: critical wheels up, {up} of {len(climbs)}"))
+    step, sound = problem.obstacle, [t for t in trials if t.climb is not None and not t.exploded]
+    edge = float(np.array(step.normal) @ np.array(step.place))
+    ups = [t.outcome is not None and t.outcome.critical_up for t in sound]
+    planned = _turned(plan.trajectory.at(np.linspace(0.0, plan.duration, 200)).pose, step.direction)
+    note = "" if step.direction == 0.0 else "\n(turned: the step's normal points along x)"
+    panels = [Motions(f"{plan.configuration.name}: approach", [_turned(t.approach.pose, step.direction) for t in sound],
+                      [True] * len(sound), planned, edge, "dashed: the plan" + note),
+              Motions("climb", [_turned(t.climb.pose, step.direction) for t in sound if t.climb is not None], ups, None,
+                      edge, f"blue: critical wheels up, {sum(ups)} of {len(sound)}")]
     with in_style():
         return save_figure(motions_figure(panels, problem.platform, columns=2), made_folder(folder) / "trials.png")
+
+
+def _turned(pose: Array, direction: float) -> Array:
+    """Poses (N, 3) in axes turned by ``direction`` (rad)."""
+    cos, sin = math.cos(direction), math.sin(direction)
+    return np.column_stack([cos * pose[:, 0] + sin * pose[:, 1], cos * pose[:, 1] - sin * pose[:, 0],
+                            pose[:, 2] - direction])

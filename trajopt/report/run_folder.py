@@ -166,6 +166,7 @@ def validation_summary(report: ValidationReport) -> dict[str, Any]:
     length = report.length if report.length > 0 else np.nan
     return {
         "format": FORMAT, "engine": report.engine, "engine_version": report.recording.version,
+        "control": report.control, "seed": None if report.control is None else report.seed,
         "length_m": report.length, "along_m": report.along, "across_m": report.across,
         "along_share": report.along / length, "across_share": report.across / length,
         "final_distance_m": report.final_distance, "yaw_rad": report.yaw,

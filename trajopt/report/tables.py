@@ -45,7 +45,8 @@ def solution_table(solution: Solution) -> Table:
 
 def validation_table(report: ValidationReport) -> Table:
     """Deviations of the simulated from the planned motion."""
-    table = _table(f"Check in {report.engine} {report.recording.version}")
+    feedback = "" if report.control is None else f", {report.control}, seed {report.seed}"
+    table = _table(f"Check in {report.engine} {report.recording.version}{feedback}")
     share = 100 / report.length if report.length > 0 else np.nan
     table.add_row("path length", f"{report.length:.3f} m")
     table.add_row("final error along", f"{1e3 * report.along:+.2f} mm ({share * report.along:+.2f} %)")

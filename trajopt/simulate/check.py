@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.control.approach import Mode, approach_controller
-from trajopt.errors import SimulationError
+from trajopt.errors import ArgumentError, SimulationError
 from trajopt.problem import Problem
 from trajopt.robots.catalogue import robot_named
 from trajopt.simulate.approach_run import SETTLE, steered
@@ -29,8 +29,9 @@ class ValidationReport:
 
     ``along`` and ``across``: final position error along and across the planned final direction of travel;
     ``yaw``: final heading error; ``wheel_deviation`` (4,): final wheel angle minus planned;
-    ``path_rms`` and ``path_max``: distance from the planned position at the same time.
-    ``planned`` (N, 3) are the planned poses at the recording's times.
+    ``path_rms`` and ``path_max``: distance from the planned position at the same time, until the plan ends (what a
+    controller bends on purpose counts too). ``planned`` (N, 3) are the planned poses at the recording's times.
+    ``control`` and ``seed`` say what was switched on; None: the planned wheel speeds.
     """
 
     engine: str
@@ -44,6 +45,8 @@ class ValidationReport:
     real_time_factor: float
     planned: Array = field(repr=False)
     recording: Recording = field(repr=False)
+    control: Mode | None = None
+    seed: int = 0
 
     @property
     def final_distance(self) -> float:
@@ -59,8 +62,10 @@ def drive_trajectory(
 
     With ``control`` the pose is measured as ``Sensors`` says, blurred by random numbers of ``seed``, and the plan that
     the motion is compared with is timed as the controller wants it. Raises SimulationError when the run leaves
-    physics, ArgumentError where the controller refuses the trajectory.
+    physics, ArgumentError for a seed below 0 or where the controller refuses the trajectory.
     """
+    if seed < 0:
+        raise ArgumentError("seed", seed, "a whole number >= 0")
     if control is not None:
         return _controlled(trajectory, problem, engine, picture, control, seed)
     samples = max(2, round(trajectory.duration / SAMPLE_TIME) + 1)
@@ -77,7 +82,8 @@ def drive_trajectory(
     )
     recording = _run(engine, problem, command, picture, None)
     plan = trajectory.at(np.minimum(recording.times, trajectory.duration))
-    return _compared(plan.pose, np.asarray(problem.start.wheels) + plan.wheel_angles[-1], recording)
+    return _compared(plan.pose, np.asarray(problem.start.wheels) + plan.wheel_angles[-1], recording,
+                     trajectory.duration)
 
 
 def _controlled(trajectory: Trajectory, problem: Problem, engine: str, picture: bool, control: Mode,
@@ -91,7 +97,8 @@ def _controlled(trajectory: Trajectory, problem: Problem, engine: str, picture: 
                       _four(problem.start.wheels))
     recording = _run(engine, problem, command, picture, steered(controller))
     planned = np.column_stack([np.interp(recording.times, reference.times, column) for column in reference.pose.T])
-    return _compared(planned, reference.wheels[-1], recording)
+    report = _compared(planned, reference.wheels[-1], recording, float(reference.times[-1]))
+    return replace(report, control=control, seed=seed)
 
 
 def _run(engine: str, problem: Problem, command: Command, picture: bool,
@@ -103,10 +110,11 @@ def _run(engine: str, problem: Problem, command: Command, picture: bool,
     return recording
 
 
-def _compared(planned: Array, wheels: Array, recording: Recording) -> ValidationReport:
-    """Against the planned poses (N, 3) at the recording's times and the planned final wheel angles (4,)."""
+def _compared(planned: Array, wheels: Array, recording: Recording, end: float) -> ValidationReport:
+    """Against the planned poses (N, 3) at the recording's times and the planned final wheel angles (4,); the plan
+    ends at ``end`` (s)."""
     error = recording.pose - planned
-    distance = np.hypot(error[:, 0], error[:, 1])
+    distance = np.hypot(error[:, 0], error[:, 1])[recording.times <= end]
     heading = _final_direction(planned)
     dx, dy = error[-1, :2]
     return ValidationReport(

@@ -174,9 +174,9 @@ def run_approach(step: StepScene, command: Command, *, engine: str = "mujoco",
                  controller: Controller | None = None, rest: float = COAST) -> Recording:
     """Sub-test 1: execute an approach (its wheel speeds, or a controller) with the step standing there.
 
-    An approach ends at rest, so the run ends ``rest`` seconds after it; TIMEOUT bounds that.
+    An approach ends at rest, so the run ends ``rest`` seconds after it; TIMEOUT bounds that without a controller.
     """
-    extra = min(rest, (TIMEOUT - 1.0) * command.duration)
+    extra = rest if controller is not None else min(rest, (TIMEOUT - 1.0) * command.duration)
     end = command.duration
     times = np.append(command.times, [end + 1e-6, end + extra])
     speeds = np.vstack([command.wheel_speeds, np.zeros((2, 4))])

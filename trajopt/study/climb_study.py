@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.errors import ArgumentError
-from trajopt.maneuver import approach_target, configurations
+from trajopt.maneuver import approach_target, configurations, travel_to_step
 from trajopt.maneuver_problem import ManeuverProblem
 from trajopt.simulate.climb import Climb, run_climb
 from trajopt.study.cases import Case
@@ -40,7 +40,8 @@ def trial(case: Case, problem: ManeuverProblem) -> dict[str, Any]:
     pose = before_step(problem, np.array([x, y, yaw]))
     wheels = four(np.array(target.wheels) + rng.normal(0.0, WHEEL_SD, 4))
     step = step_scene(problem, float(case["friction"]), float(case["torque"]))
-    outcome = run_climb(Climb(step, pose, wheels, chosen.direction, critical_wheels(chosen), target.travel),
+    outcome = run_climb(Climb(step, pose, wheels, chosen.direction, critical_wheels(chosen),
+                              travel_to_step(problem, chosen, pose)),
                         str(case["engine"]))
     if outcome.exploded:
         return {"exploded": True, "reason": outcome.reason}

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 
 import numpy as np
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from trajopt.control.approach import Mode, Sensors, approach_controller
 from trajopt.control.bend import Goal
 from trajopt.errors import ArgumentError
-from trajopt.maneuver import Configuration, Plan
+from trajopt.maneuver import Configuration, Plan, travel_to_step
 from trajopt.maneuver_problem import ManeuverProblem
 from trajopt.problem import WHEELS
 from trajopt.simulate.approach_run import Ending, ending_of, run_controlled
@@ -42,14 +43,22 @@ class Scatter:
     wheels: float = 0.05
     friction: float = 0.25
 
+    def __post_init__(self) -> None:
+        for name in ("position", "yaw", "wheels"):
+            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
+                raise ArgumentError(f"scatter.{name}", getattr(self, name), "a finite standard deviation >= 0")
+        if not 0 <= self.friction < 1:
+            raise ArgumentError("scatter.friction", self.friction, "a share from 0 to less than 1")
+
 
 @dataclass(frozen=True, eq=False)
 class ClimbTrial:
     """One trial: how the approach ended, and what the climb from there came to (None where the approach left
-    physics)."""
+    physics). ``moved_back`` (m): where the approach ended too near to the step for a climb to start from."""
 
     number: int
     friction: float
+    moved_back: float
     ending: Ending
     outcome: Outcome | None
     approach: Recording
@@ -105,6 +114,10 @@ def climb_trial(problem: ManeuverProblem, plan: Plan, number: int, *, control: M
     Raises ArgumentError where the manoeuvre turns too little for "pose and phase", MissingDependencyError where the
     engine is not installed.
     """
+    if number < 0:
+        raise ArgumentError("number", number, "a whole number >= 0")
+    if sensors is not None and control is None:
+        raise ArgumentError("sensors", sensors, "None without control: planned wheel speeds measure nothing")
     scatter = Scatter() if scatter is None else scatter
     rng = np.random.default_rng([number, 11])
     friction = problem.ground.friction * float(rng.uniform(1 - scatter.friction, 1 + scatter.friction))
@@ -123,38 +136,40 @@ def climb_trial(problem: ManeuverProblem, plan: Plan, number: int, *, control: M
         approach = run_controlled(step, controller, command.start_pose, command.start_wheel_angles, engine=engine)
     ending = ending_of(approach, goal)
     if approach.exploded:
-        return ClimbTrial(number, friction, ending, None, approach, None)
+        return ClimbTrial(number, friction, 0.0, ending, None, approach, None)
     pose, wheels = reached(approach)
-    climb = Climb(step, before_step(problem, np.array(pose)), wheels, plan.configuration.direction, critical,
-                  plan.target.travel)
+    start = before_step(problem, np.array(pose))
+    climb = Climb(step, start, wheels, plan.configuration.direction, critical,
+                  travel_to_step(problem, plan.configuration, start))
     recording = record_climb(climb, engine)
-    return ClimbTrial(number, friction, ending, judge(climb, recording), approach, recording)
+    return ClimbTrial(number, friction, math.dist(start[:2], pose[:2]), ending, judge(climb, recording), approach,
+                      recording)
 
 
 def climb_trials(problem: ManeuverProblem, plan: Plan, numbers: Sequence[int], *, control: Mode | None = None,
-                 engine: str = "mujoco", workers: int = 1,
-                 progress: Callable[[int], None] | None = None) -> list[ClimbTrial]:
+                 sensors: Sensors | None = None, engine: str = "mujoco", scatter: Scatter | None = None,
+                 workers: int = 1, progress: Callable[[list[ClimbTrial]], None] | None = None) -> list[ClimbTrial]:
     """Trials in the order of ``numbers``, the same whatever the number of worker processes.
 
-    ``progress(done)`` is called after each. Raises ArgumentError for no trials or workers < 1.
+    ``progress(done)`` is called after each with all that are done. Raises as ``climb_trial``, and ArgumentError for
+    no trials or workers < 1.
     """
     if len(numbers) == 0:
         raise ArgumentError("numbers", list(numbers), "at least one trial")
     if workers < 1:
         raise ArgumentError("workers", workers, "at least 1")
     found = []
-    for trial in _mapped(problem, plan, numbers, control, engine, workers):
+    one = partial(climb_trial, problem, plan, control=control, sensors=sensors, engine=engine, scatter=scatter)
+    for trial in _mapped(one, numbers, workers):
         found.append(trial)
         if progress is not None:
-            progress(len(found))
+            progress(found)
     return found
 
 
-def _mapped(problem: ManeuverProblem, plan: Plan, numbers: Sequence[int], control: Mode | None, engine: str,
-            workers: int) -> Iterator[ClimbTrial]:
+def _mapped(one: Callable[[int], ClimbTrial], numbers: Sequence[int], workers: int) -> Iterator[ClimbTrial]:
     if workers == 1:
-        yield from (climb_trial(problem, plan, n, control=control, engine=engine) for n in numbers)
+        yield from map(one, numbers)
         return
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = [pool.submit(climb_trial, problem, plan, n, control=control, engine=engine) for n in numbers]
-        yield from (job.result() for job in jobs)
+        yield from pool.map(one, numbers)
