@@ -24,6 +24,7 @@ from trajopt.report.smdw import cam_figure, geometry_figure, setups_figure, whee
 from trajopt.report.smdw_trials import (
     ClimbCell,
     Motions,
+    causes_figure,
     climb_rates_figure,
     endings_figure,
     motions_figure,
@@ -163,6 +164,20 @@ def phase_map(engine: str) -> Figure | None:
     return phase_map_figure(shares, phases) if shares else None
 
 
+def causes(engine: str) -> Figure | None:
+    """Climbs over heading error, gap and speed in one engine; None without its trials."""
+    found: dict[str, dict[str, dict[float, tuple[int, int]]]] = {}
+    for r in trial_rows("causes"):
+        if r["engine"] != engine:
+            continue
+        cause, value = r["source"].rsplit(": ", 1)
+        label = f"{r['configuration']}, {100 * float(r['height']):g} cm, {float(r['torque']):g} N m"
+        cells = found.setdefault(cause, {}).setdefault(label, {})
+        up, of = cells.get(float(value), (0, 0))
+        cells[float(value)] = up + (r["critical_up"] == "True"), of + 1
+    return causes_figure(found) if found else None
+
+
 def endings(engine: str) -> Figure | None:
     """How approaches end under control in one engine; None without its trials."""
     rows = closed_loop.kept(OUT / f"closed_loop_{engine}_trials.csv")
@@ -178,7 +193,7 @@ def from_files() -> Iterator[tuple[str, Figure]]:
     if cells:
         yield "climb_rates.png", climb_rates_figure(cells)
     for engine in ENGINES:
-        for name, figure in ((f"phase_map_{engine}.png", phase_map(engine)),
+        for name, figure in ((f"phase_map_{engine}.png", phase_map(engine)), (f"causes_{engine}.png", causes(engine)),
                              (f"closed_loop_{engine}.png", endings(engine))):
             if figure is not None:
                 yield name, figure

@@ -90,6 +90,9 @@ NOTES = {
     "phases": "A climb: both critical wheels up. One row of a picture is a wheel torque and friction; phase decides "
               "where a row is neither full nor empty. With torque to spare and little friction wheels spin until the "
               "phase fits; with little torque few phases climb.",
+    "causes": "Both critical wheels up, 20 trials a point, at a torque where climbs are in doubt. A heading error "
+              "turns the robot about its centre, so the leading wheel is farther back and meets the step at "
+              "another phase; a longer gap lets phase errors grow; a faster robot brings momentum.",
 }
 
 
@@ -118,7 +121,8 @@ class Page:
                  "## Sub-test 2", *self.shown("sub_test_2", "figure_6_7", "figure_6_8"), *self.table("printed"),
                  NOTES["printed"], "## When phase decides", NOTES["phases"],
                  *(self.shown("phase_map") or ["Not run yet: `python -m benchmarks.climb --parts phases`."]),
-                 *self.table("phases"),
+                 *self.table("phases"), "## What else sets the rate", NOTES["causes"],
+                 *(self.shown("causes") or ["Not run yet: `python -m benchmarks.climb --parts causes`."]),
                  "## Closed loop", *self.shown("closed_loop"), *other_pages()]
         return "\n\n".join(parts) + "\n"
 

@@ -45,6 +45,13 @@ def test_the_phase_map_shows_every_share() -> None:
     assert np.array_equal(np.asarray(image.get_array()), [[0.0, 1.0], [0.5, 1.0]])
 
 
+def test_causes_show_a_share_a_value_and_its_interval() -> None:
+    figure = smdw_trials.causes_figure({"gap, cm": {"lateral": {2.0: (20, 20), 5.0: (5, 20)}}})
+    line = figure.axes[0].get_lines()[0]
+    assert np.asarray(line.get_ydata()) == pytest.approx([1.0, 0.25])
+    assert [tick.get_text() for tick in figure.axes[0].get_xticklabels()] == ["2", "5"]
+
+
 def test_every_ending_is_drawn_in_its_units() -> None:
     errors = np.array([[0.002, 0.0175, 0.03], [0.004, 0.0087, 0.05]])
     figure = smdw_trials.endings_figure({"noiseless": errors}, {"noiseless": (0.005, 0.0087, 0.06)})

@@ -116,6 +116,25 @@ def phase_map_figure(shares: Mapping[tuple[str, float], Mapping[tuple[float, flo
     return figure
 
 
+def causes_figure(causes: Mapping[str, Mapping[str, Mapping[float, tuple[int, int]]]]) -> Figure:
+    """Share that climbs over one cause a panel: for each label (a line) and value, (successes, trials); bars are
+    Wilson's 95 % intervals, lines are set a little aside of each other."""
+    figure = new_figure(3.0, 8.8)
+    axes = figure.subplots(1, len(causes), sharey=True, squeeze=False)[0]
+    for ax, (cause, lines) in zip(axes, causes.items(), strict=True):
+        for k, (label, cells) in enumerate(lines.items()):
+            places = np.arange(len(cells)) + 0.08 * (k - (len(lines) - 1) / 2)
+            shares = np.array([up / max(of, 1) for up, of in cells.values()])
+            ends = np.array([wilson(up, of) for up, of in cells.values()])
+            ax.errorbar(places, shares, np.abs(ends.T - shares), color=(BLUE, SKY, VERMILION, ORANGE)[k % 4],
+                        marker="o", markersize=3, linewidth=1.2, elinewidth=0.8, label=label)
+            ax.set_xticks(range(len(cells)), [f"{value:g}" for value in cells])
+        ax.set_xlabel(cause)
+    axes[0].set(ylabel="critical wheels up, share", ylim=(-0.03, 1.03))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    return figure
+
+
 def endings_figure(endings: Mapping[str, Array], bounds: Mapping[str, tuple[float, float, float]]) -> Figure:
     """Final errors (n, 3) of position (m), yaw (rad) and critical phase (rad) for each control, beside its bounds."""
     names = list(endings)
