@@ -84,9 +84,9 @@ NOTES = {
     "printed": "The thesis's ten printed states start sub-test 2 as they stand, phases kept along the rotation. From "
                "them our robot climbs sideways where the thesis's did not, so those states alone do not explain its "
                "failures. Setting the yaw right, which let its robot climb, hinders ours: turned about its centre, the "
-               "leading wheel stands 2-5 cm farther back and meets the step up to 0.5 rad later, past the end of the "
-               "window at 0.5 rad. Moved up by as much, it climbs as before. So here it is the phase at contact that "
-               "counts, not the yaw; a centimetre more or less of the edge, whose place is inferred, is 0.1 rad.",
+               "leading wheel stands farther back and meets the step later, past the end of its window. Moved up by as "
+               "much, it climbs as before. So here it is the phase at contact that counts, not the yaw; a centimetre "
+               "more or less of the edge, whose place is inferred, is 0.1 rad.",
     "phases": "A climb: both critical wheels up. One row of a picture is a wheel torque and friction; phase decides "
               "where a row is neither full nor empty. With torque to spare and little friction wheels spin until the "
               "phase fits; with little torque few phases climb.",
@@ -111,7 +111,8 @@ class Page:
                  *self.shown("climb_rates"), HEADLINE, *self.table("headline"), reading(self.cells),
                  *self.table("order"), WHY_CLIMB,
                  "## What stands for what", *markdown_block(correspondence()),
-                 "## Wheel", *self.table("geometry"), NOTES["geometry"], *self.shown("cam", "geometry_5cm"),
+                 "## Wheel", *self.table("geometry"), *self.table("agreement"), NOTES["geometry"],
+                 *self.shown("cam", "geometry_5cm"),
                  *self.shown("figure_6_9"), NOTES["figure_6_9"],
                  "## Searches", *self.table("figures_5_15"), *self.shown("swarms"), NOTES["swarms"],
                  *self.shown("searches"), *self.table("table_5_6"), *self.table("table_5_5"), NOTES["searches"],

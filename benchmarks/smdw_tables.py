@@ -42,7 +42,7 @@ from trajopt.problem import WHEELS, Problem, load_problem
 from trajopt.report.smdw import plans_figure
 from trajopt.report.style import in_style, save_figure
 from trajopt.robots.smdw import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
-from trajopt.robots.smdw_geometry import contact_offset
+from trajopt.robots.smdw_geometry import CLOUD_POINTS, contact_offset, meet_step, meet_step_cloud
 from trajopt.simulate.engine import ENGINES
 
 Array = NDArray[np.float64]
@@ -126,6 +126,29 @@ def geometry() -> ResultTable:
                                           "forward alpha for 5 cm at theta 0, deg", "at any theta"), rows)
 
 
+def agreement(quick: bool) -> ResultTable:
+    """Largest difference between closed form and point cloud over wheel angle, yaw and three heights; none left out."""
+    rows = []
+    every = 30.0 if quick else 5.0  # deg
+    yaws = np.radians(np.arange(-180.0 + every, 0.0, every))
+    for name, wheel in (("default", DEFAULT_WHEEL), ("fitted to the print", FITTED_WHEEL)):
+        apart, nodes, verdicts = np.zeros(4), 0, 0
+        for height in (0.02, 0.035, 0.045):
+            for theta in np.radians(np.arange(-180.0, 180.0, every)):
+                exact = meet_step(wheel, theta, yaws, height)
+                for k, yaw in enumerate(yaws):
+                    cloud = meet_step_cloud(wheel, float(theta), float(yaw), height)
+                    nodes, verdicts = nodes + 1, verdicts + int(bool(cloud.over) != bool(exact.over[k]))
+                    if cloud.over and exact.over[k]:
+                        apart = np.maximum(apart, [abs(cloud.clearance - exact.clearance[k]),
+                                                   abs(cloud.offset - exact.offset[k]), abs(cloud.arm - exact.arm[k]),
+                                                   abs(math.degrees(cloud.tangent - exact.tangent[k]))])
+        rows.append((name, str(nodes), str(verdicts), *(f"{value:.2g}" for value in apart)))
+    return ResultTable(f"Wheel geometry: closed form against {CLOUD_POINTS:,} points, largest difference",
+                       ("sizes", "nodes", "verdicts that differ", "clearance, m", "contact offset, m", "lever arm, m",
+                        "tangent angle, deg"), rows)
+
+
 def scenarios() -> tuple[ResultTable, list[tuple[str, Figure]]]:
     """The thesis's six searches (Tables 6.1, 6.6): its PSO re-run against the exact planner; pictures of the plans."""
     rows: list[tuple[str, ...]] = []
@@ -175,8 +198,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                                  ("searches.png", searches(quick)), *scenario_searches(quick), *plans,
                                  *motions(runs, quick)])
     tables = {"headline": headline(cells), "order": orders(cells)} if cells else {}
-    tables |= {"geometry": geometry(), "figures_5_15": figures_5_15(swarm), "table_5_6": table_5_6(quick),
-               "table_5_5": table_5_5(quick), "scenarios": made, "tables_6": tables_6(runs[1])}
+    tables |= {"geometry": geometry(), "agreement": agreement(quick), "figures_5_15": figures_5_15(swarm),
+               "table_5_6": table_5_6(quick), "table_5_5": table_5_5(quick), "scenarios": made,
+               "tables_6": tables_6(runs[1])}
     tables |= {"printed": smdw_printed.table(printed)} if printed else {}
     decided = regimes(ENGINES)
     tables |= {"phases": decided} if decided.rows else {}

@@ -100,6 +100,11 @@ def test_feedback_in_the_check_brings_pose_and_critical_wheels_to_the_goal(scena
     assert other.final_distance != report.final_distance
 
 
+def test_a_seed_below_zero_is_refused(scenario):
+    with pytest.raises(ArgumentError, match="seed"):
+        validate(solve(scenario).trajectory, scenario, engine="mujoco", control="pose", seed=-1)
+
+
 def test_missing_engine_is_named(scenario, monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(MissingDependencyError, match=r"trajopt\[simulate\]"):

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks import smdw_figures, smdw_page, smdw_printed, smdw_searches
+from benchmarks import closed_loop, smdw_figures, smdw_page, smdw_printed, smdw_searches
 from trajopt.objectives.terminal import terminal_cost
 from trajopt.report.smdw_trials import ClimbCell
 
@@ -116,3 +116,11 @@ def test_every_picture_has_a_place_and_every_named_picture_exists(tmp_path: Path
     assert text.index("climb_rates.png") < text.index("Climbs of trials") < text.index("## What stands for what")
     assert "## Benchmark: climb\n\n### Sub-test 2" in text
     assert "not shown" not in text
+
+
+def test_a_cell_whose_trials_all_left_physics_has_no_errors_to_show() -> None:
+    lost = closed_loop.Row("pose only, noisy", "step_5cm.toml", "lateral left", 7, 9.0, 9.0, 9.0, 3.0, 4.0,
+                           exploded=True)
+    cell = closed_loop.table([lost]).rows[0]
+    assert cell[3].startswith("0/1")
+    assert tuple(cell[4:]) == ("-", "-", "-", "-", "1")

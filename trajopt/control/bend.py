@@ -28,7 +28,7 @@ BEND_WEIGHT = 0.1  # of the remaining length (m), and of the smaller of 1 rad an
 END_WEIGHT = (0.001, 0.001, math.radians(0.1))
 BUMP = 6.75  # makes the largest value of sigma^2 (1 - sigma) 1
 # The second half of the path is taken ever slower, at its end by this factor, chosen: hard braking creeps in one
-# direction (1-2 mm every 0.1 s), at the end of the path, where nothing is left that could turn the wheels.
+# direction, at the end of the path, where nothing is left that could turn the wheels.
 TAIL_STRETCH = 1.8
 SAMPLES = 241  # of a trajectory, chosen: 15 ms on 3.5 s
 _STEP = 1e-5  # m or rad, for difference quotients

@@ -24,13 +24,13 @@ from trajopt.maneuver import Configuration, Plan, travel_to_step
 from trajopt.maneuver_problem import ManeuverProblem
 from trajopt.problem import WHEELS
 from trajopt.simulate.approach_run import Ending, ending_of, run_controlled
+from trajopt.simulate.check import SAMPLE_TIME
 from trajopt.simulate.climb import Climb, Four, Outcome, StepScene, judge, reached, record_climb, run_approach
 from trajopt.simulate.engine import Command, Recording
 
 Array = NDArray[np.float64]
 
 NEAREST = 0.004  # m, least gap to the step that a climb starts with; chosen
-SAMPLE_TIME = 0.002  # s between wheel speed commands: the engines' own step
 
 
 @dataclass(frozen=True)

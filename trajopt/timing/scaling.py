@@ -97,7 +97,7 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
 def rough_duration(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
                    gridpoints: int | ArrayLike | None = None) -> float:
     """Duration (s) from rest to rest of the fastest profile that keeps the limits at the gridpoints; between them
-    nothing is checked or refused. It ranks paths in about half of the time of ``time_scale``, on flat ground; raises
+    nothing is checked or refused. It ranks paths faster than ``time_scale``, on flat ground; raises
     as that does at the gridpoints.
     """
     job = _job(path, limits, robot, None, (0.0, 0.0), "auto", ())
