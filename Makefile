@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-slurm check format schema pictures clean
+.PHONY: help demo test test-all test-slurm check format lines schema pictures clean
 
 help:  ## what the targets do
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /  -  /'
@@ -34,9 +34,16 @@ test-slurm: $(READY)  ## sweeps on a real Slurm of one node, which it installs (
 	tests/slurm/ci.sh $(BIN)/python
 
 check: $(READY)  ## ruff, mypy and the import order
+	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+format: $(READY)  ## rewrite all Python files in the project's form
+	$(BIN)/ruff format .
+
+lines: $(READY)  ## lines of code of trajopt/, without blanks, comments, docstrings
+	$(BIN)/python tests/code_lines.py trajopt
 
 schema: $(READY)  ## rewrite the JSON schema of problem files
 	$(BIN)/trajopt schema --out problems/problem.schema.json

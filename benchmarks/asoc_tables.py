@@ -1,6 +1,8 @@
-"""Thesis 001 (active split offset casters) reproduced: tables and figures, printed values beside ours.
+"""Thesis 001 (active split offset casters) reproduced: tables and figures, printed values beside
+ours.
 
-Run as ``python -m benchmarks.asoc_tables``. ``--quick`` takes coarser quadrature, fewer seeds and no physics.
+Run as ``python -m benchmarks.asoc_tables``. ``--quick`` takes coarser quadrature, fewer seeds and
+no physics.
 """
 
 from __future__ import annotations
@@ -68,8 +70,9 @@ BASELINE = (0.15, 0.20, 0.15, 0.03)  # m, Table VI: offset, split, radius, width
 
 
 def mean(places: Array, ratio: float, effort: Effort, **options: object) -> float:
-    found = mean_isotropy(places, ratio, rng=np.random.default_rng(0), points=effort.points, shifts=4,
-                          **options)  # type: ignore[arg-type]  # options of several types
+    found = mean_isotropy(
+        places, ratio, rng=np.random.default_rng(0), points=effort.points, shifts=4, **options
+    )  # type: ignore[arg-type]  # options of several types
     return found.value
 
 
@@ -78,12 +81,16 @@ def mobility() -> ResultTable:
     for name, make in NAMED.items():
         m = mobility_of(make())
         rows.append((name, str(m.mobility), str(m.steerability), str(m.manoeuvrability)))
-    return ResultTable("Mobility of the textbook platforms (lecture 003)",
-                       ("platform", "mobility", "steerability", "manoeuvrability"), rows)
+    return ResultTable(
+        "Mobility of the textbook platforms (lecture 003)",
+        ("platform", "mobility", "steerability", "manoeuvrability"),
+        rows,
+    )
 
 
 def table_1(effort: Effort) -> ResultTable:
-    """Every distinct placement of lost and partial modules; the thesis averages them in a way it does not say."""
+    """Every distinct placement of lost and partial modules; the thesis averages them in a way it
+    does not say."""
     rows = []
     for (modules, lost, partial), printed in TABLE_1.items():
         seen: dict[float, str] = {}
@@ -93,9 +100,17 @@ def table_1(effort: Effort) -> ResultTable:
             rest = [i for i in range(modules) if i not in gone]
             for half in itertools.combinations(rest, partial):
                 value = mean(spread_modules(modules), 2.0, effort, contact=Contact(gone, half))
-                seen.setdefault(round(value, 2), f"{value:.4f} (lost {list(gone)}, partial {list(half)})")
-        rows.append((str(modules), str(lost), str(partial), f"{printed:.3f}", "; ".join(seen.values())))
-    return ResultTable("Table I: isotropy under loss of contact", ("ASOCs", "lost", "partial", "printed", "ours"), rows)
+                seen.setdefault(
+                    round(value, 2), f"{value:.4f} (lost {list(gone)}, partial {list(half)})"
+                )
+        rows.append(
+            (str(modules), str(lost), str(partial), f"{printed:.3f}", "; ".join(seen.values()))
+        )
+    return ResultTable(
+        "Table I: isotropy under loss of contact",
+        ("ASOCs", "lost", "partial", "printed", "ours"),
+        rows,
+    )
 
 
 def table_2(effort: Effort) -> ResultTable:
@@ -105,11 +120,19 @@ def table_2(effort: Effort) -> ResultTable:
         tilts = (-tilt, 0.0, tilt) if degrees else (0.0,)
         ratios = np.arange(1.9, 3.2, 0.05)
         quick = replace(effort, points=max(effort.points // 4, 256))
-        values = np.array([mean(spread_modules(4), float(r), quick, tilts=tilts, jacobian="forward") for r in ratios])
+        values = np.array(
+            [
+                mean(spread_modules(4), float(r), quick, tilts=tilts, jacobian="forward")
+                for r in ratios
+            ]
+        )
         top, value = best_ratio(values, ratios)
         rows.append((f"{degrees}", f"{printed:.3f}", f"{ratio:.2f}", f"{value:.4f}", f"{top:.2f}"))
-    return ResultTable("Table II: best isotropy and ratio by terrain angle (N = 4, tilts -max, 0, +max)",
-                       ("angle, deg", "printed isotropy", "printed ratio", "isotropy", "ratio"), rows)
+    return ResultTable(
+        "Table II: best isotropy and ratio by terrain angle (N = 4, tilts -max, 0, +max)",
+        ("angle, deg", "printed isotropy", "printed ratio", "isotropy", "ratio"),
+        rows,
+    )
 
 
 def ring(first: float, second: float) -> Array:
@@ -118,20 +141,52 @@ def ring(first: float, second: float) -> Array:
 
 
 def figures_9_and_11(effort: Effort) -> ResultTable:
-    rows = [("Figure 9", f"ratio {r:g}", f"{v:.3f}", f"{mean(spread_modules(3), r, effort):.4f}")
-            for r, v in FIGURE_9.items()]
-    rows += [("Figure 11", f"modules at 0, {a}, {2 * a} deg", f"{v:.3f}",
-              f"{mean(ring(a, 2 * a), 2.0, effort):.4f}") for a, v in FIGURE_11.items()]
-    rows += [("eq. 4", f"tilt {d} deg, ratio {2 / np.cos(np.radians(d)):.4f}", "1.000",
-              f"{mean(spread_modules(3), float(2 / np.cos(np.radians(d))), effort, tilts=(np.radians(d),)):.4f}")
-             for d in (15, 30, 45)]
-    rows += [("eq. 8", "split 0.20, offset 0.10, radius 0.20 m", "30", f"{np.degrees(largest_pivot(.1, .2, .2)):.2f}"),
-             ("section 3.5", "point design's pivot, deg", "30",
-              f"{np.degrees(largest_pivot(POINT_DESIGN.offset, POINT_DESIGN.split, POINT_DESIGN.wheel_radius)):.2f}")]
+    rows = [
+        ("Figure 9", f"ratio {r:g}", f"{v:.3f}", f"{mean(spread_modules(3), r, effort):.4f}")
+        for r, v in FIGURE_9.items()
+    ]
+    rows += [
+        (
+            "Figure 11",
+            f"modules at 0, {a}, {2 * a} deg",
+            f"{v:.3f}",
+            f"{mean(ring(a, 2 * a), 2.0, effort):.4f}",
+        )
+        for a, v in FIGURE_11.items()
+    ]
+    rows += [
+        (
+            "eq. 4",
+            f"tilt {d} deg, ratio {2 / np.cos(np.radians(d)):.4f}",
+            "1.000",
+            f"{mean(spread_modules(3), float(2 / np.cos(np.radians(d))), effort, tilts=(np.radians(d),)):.4f}",
+        )
+        for d in (15, 30, 45)
+    ]
+    rows += [
+        (
+            "eq. 8",
+            "split 0.20, offset 0.10, radius 0.20 m",
+            "30",
+            f"{np.degrees(largest_pivot(0.1, 0.2, 0.2)):.2f}",
+        ),
+        (
+            "section 3.5",
+            "point design's pivot, deg",
+            "30",
+            f"{np.degrees(largest_pivot(POINT_DESIGN.offset, POINT_DESIGN.split, POINT_DESIGN.wheel_radius)):.2f}",
+        ),
+    ]
     for kind in Linkage:
         travel = suspension_travel(kind, FourBar(), POINT_DESIGN)
-        rows.append(("section 3.4", f"travel of the {kind.value} linkage, m", "0.33" if kind is Linkage.SHAPED_SPLIT
-                     else "-", f"{travel.up:.3f} up ({travel.up_end}), {travel.down:.3f} down ({travel.down_end})"))
+        rows.append(
+            (
+                "section 3.4",
+                f"travel of the {kind.value} linkage, m",
+                "0.33" if kind is Linkage.SHAPED_SPLIT else "-",
+                f"{travel.up:.3f} up ({travel.up_end}), {travel.down:.3f} down ({travel.down_end})",
+            )
+        )
     return ResultTable("Isotropy curves and geometry", ("where", "case", "printed", "ours"), rows)
 
 
@@ -145,13 +200,35 @@ def table_5() -> ResultTable:
             base = design.terms(BASELINE[0], BASELINE[1], 1e-9, BASELINE[3])[3]
             fit = best_width(design, offset, split, radius)
             gain = 100 * (design.terms(offset, split, radius - offset, fit)[3] / base - 1)
-            rows.append((soil, model.value, f"{width:.3f}", f"{fit:.4f}", f"{100 * (fit / width - 1):+.1f} %",
-                         f"{TABLE_6[soil]:.1f}", f"{gain:.1f}",
-                         " ".join(f"{v:.3f}" for v in (best[0], best[1], best[0] + best[2], best[3])), f"{total:.4f}"))
-    return ResultTable("Tables V, VI: wheel width and gain of d_max at the printed other sizes; optimum of J on "
-                       "our design space", ("soil", "reading", "printed width, m", "width, m", "difference",
-                                        "printed gain, %", "gain, %",
-                                             "optimum offset split radius width, m", "J"), rows)
+            rows.append(
+                (
+                    soil,
+                    model.value,
+                    f"{width:.3f}",
+                    f"{fit:.4f}",
+                    f"{100 * (fit / width - 1):+.1f} %",
+                    f"{TABLE_6[soil]:.1f}",
+                    f"{gain:.1f}",
+                    " ".join(f"{v:.3f}" for v in (best[0], best[1], best[0] + best[2], best[3])),
+                    f"{total:.4f}",
+                )
+            )
+    return ResultTable(
+        "Tables V, VI: wheel width and gain of d_max at the printed other sizes; optimum of J on "
+        "our design space",
+        (
+            "soil",
+            "reading",
+            "printed width, m",
+            "width, m",
+            "difference",
+            "printed gain, %",
+            "gain, %",
+            "optimum offset split radius width, m",
+            "J",
+        ),
+        rows,
+    )
 
 
 def table_4() -> ResultTable:
@@ -162,11 +239,16 @@ def table_4() -> ResultTable:
             design = AsocDesign(soil_named("sandy_loam"), modules, model)
             found[modules] = design.describe(full_factorial(design)[0])
         for modules in (4, 5):
-            change = [f"{100 * (found[modules][t] / found[3][t] - 1):+.1f} ({p:+.1f})"
-                      for t, p in zip(TERMS, TABLE_4[modules], strict=True)]
+            change = [
+                f"{100 * (found[modules][t] / found[3][t] - 1):+.1f} ({p:+.1f})"
+                for t, p in zip(TERMS, TABLE_4[modules], strict=True)
+            ]
             rows.append((model.value, str(modules), *change))
-    return ResultTable("Table IV: change against three ASOCs at the optimum of J, percent (printed)",
-                       ("reading", "ASOCs", *TERMS), rows)
+    return ResultTable(
+        "Table IV: change against three ASOCs at the optimum of J, percent (printed)",
+        ("reading", "ASOCs", *TERMS),
+        rows,
+    )
 
 
 def optimizers(effort: Effort) -> ResultTable:
@@ -175,85 +257,182 @@ def optimizers(effort: Effort) -> ResultTable:
     _ = design.peaks
     began = time.perf_counter()
     best, total = full_factorial(design)
-    rows.append(("full factorial 31^4", f"{total:.5f}", "", "923521", f"{1e3 * (time.perf_counter() - began):.0f}",
-                 " ".join(f"{v:.4f}" for v in best), ""))
+    rows.append(
+        (
+            "full factorial 31^4",
+            f"{total:.5f}",
+            "",
+            "923521",
+            f"{1e3 * (time.perf_counter() - began):.0f}",
+            " ".join(f"{v:.4f}" for v in best),
+            "",
+        )
+    )
     evaluations = 25_000 if effort is FULL else 6_000
     special: dict[str, tuple[Optimizer, int]] = {
         "ipopt, 1 start": (Ipopt(starts=1), evaluations),
-        "pso-thesis-first, restarts": (replace(thesis_first(), stagnation=20, restart=True), RESTARTED),
-        "pso-thesis-enhanced, restarts": (replace(thesis_enhanced(), stagnation=20, restart=True), RESTARTED)}
+        "pso-thesis-first, restarts": (
+            replace(thesis_first(), stagnation=20, restart=True),
+            RESTARTED,
+        ),
+        "pso-thesis-enhanced, restarts": (
+            replace(thesis_enhanced(), stagnation=20, restart=True),
+            RESTARTED,
+        ),
+    }
     for name in (*special, *optimizer_names()):
         method, allowed = special.get(name, (name, evaluations))
         budget = Budget(evaluations=allowed)
         try:
-            minimize(design, design.bounds, optimizer=method, budget=Budget(evaluations=10))  # loads packages
+            minimize(
+                design, design.bounds, optimizer=method, budget=Budget(evaluations=10)
+            )  # loads packages
             began = time.perf_counter()
             found = minimize(design, design.bounds, optimizer=method, seed=1, budget=budget)
         except TrajoptError as refusal:
             rows.append((name, "", "", "", "", "", str(refusal)))
             continue
-        rows.append((name, f"{-found.fun:.5f}", f"{100 * (-found.fun / total - 1):+.3f} %", str(found.nfev),
-                     f"{1e3 * (time.perf_counter() - began):.0f}", " ".join(f"{v:.4f}" for v in found.x),
-                     found.status.name.lower()))
-    return ResultTable("Design problem, sandy loam, three ASOCs, physical reading: the same J by every optimizer",
-                       ("optimizer", "J", "against factorial", "evaluations", "ms", "offset split gap width, m",
-                        "note"), rows)
+        rows.append(
+            (
+                name,
+                f"{-found.fun:.5f}",
+                f"{100 * (-found.fun / total - 1):+.3f} %",
+                str(found.nfev),
+                f"{1e3 * (time.perf_counter() - began):.0f}",
+                " ".join(f"{v:.4f}" for v in found.x),
+                found.status.name.lower(),
+            )
+        )
+    return ResultTable(
+        "Design problem, sandy loam, three ASOCs, physical reading: the same J by every optimizer",
+        (
+            "optimizer",
+            "J",
+            "against factorial",
+            "evaluations",
+            "ms",
+            "offset split gap width, m",
+            "note",
+        ),
+        rows,
+    )
 
 
 def pareto(effort: Effort) -> tuple[ResultTable, ParetoFront, AsocDesign]:
     design = AsocDesign(soil_named("sandy_loam"))
-    front = pareto_front(design.term_values, design.bounds, len(TERMS), seed=1, generations=effort.pareto)
+    front = pareto_front(
+        design.term_values, design.bounds, len(TERMS), seed=1, generations=effort.pareto
+    )
     peaks = np.array([design.peaks[t] for t in TERMS])
     rows = []
     for k, name in enumerate(TERMS):
         i = int(np.argmax(front.terms[:, k]))
-        rows.append((f"most {name}", *(f"{v:.3f}" for v in front.terms[i] / peaks),
-                     " ".join(f"{v:.3f}" for v in front.designs[i])))
-    return ResultTable(f"Pareto front (NSGA-II, {len(front.terms)} designs), terms as shares of the factorial's best",
-                       ("design", *TERMS, "offset split gap width, m"), rows), front, design
+        rows.append(
+            (
+                f"most {name}",
+                *(f"{v:.3f}" for v in front.terms[i] / peaks),
+                " ".join(f"{v:.3f}" for v in front.designs[i]),
+            )
+        )
+    return (
+        ResultTable(
+            f"Pareto front (NSGA-II, {len(front.terms)} designs), terms as shares of the factorial's best",
+            ("design", *TERMS, "offset split gap width, m"),
+            rows,
+        ),
+        front,
+        design,
+    )
 
 
 def draw_isotropy(effort: Effort) -> None:
     few = replace(effort, points=256)
     ratios = np.linspace(0.8, 4.0, 49)
     curve = np.array([mean(spread_modules(3), float(r), few) for r in ratios])
-    save_figure(curve_figure(ratios, curve, FIGURE_9, ("Figure 9: three ASOCs", "split / offset", "mean isotropy")),
-                FIGURES / "figure_09.png")
+    save_figure(
+        curve_figure(
+            ratios, curve, FIGURE_9, ("Figure 9: three ASOCs", "split / offset", "mean isotropy")
+        ),
+        FIGURES / "figure_09.png",
+    )
     angles = np.linspace(0, 120, 25)
     curve = np.array([mean(ring(a, 2 * a), 2.0, few) for a in angles])
-    save_figure(curve_figure(angles, curve, FIGURE_11, ("Figure 11: modules at 0, a, 2a", "a, deg", "mean isotropy")),
-                FIGURES / "figure_11.png")
+    save_figure(
+        curve_figure(
+            angles, curve, FIGURE_11, ("Figure 11: modules at 0, a, 2a", "a, deg", "mean isotropy")
+        ),
+        FIGURES / "figure_11.png",
+    )
     split, offset = np.linspace(0.05, 0.5, 181), np.linspace(0.03, 0.25, 177)
     table = np.linspace(0.15, 18.0, 400)
     values = np.array([mean(spread_modules(4), float(r), replace(few, points=64)) for r in table])
     area = np.interp(split[None, :] / offset[:, None], table, values)
-    save_figure(map_figure(split, offset, area, ("Figure 8: four ASOCs", "split, m", "offset, m")),
-                FIGURES / "figure_08.png")
+    save_figure(
+        map_figure(split, offset, area, ("Figure 8: four ASOCs", "split, m", "offset, m")),
+        FIGURES / "figure_08.png",
+    )
     ratios, degrees = np.linspace(1.5, 3.2, 35), np.linspace(0, 45, 16)
-    area = np.array([[mean(spread_modules(3), float(r), few, tilts=(-np.radians(d), 0.0, np.radians(d)),
-                           jacobian="forward") for r in ratios] for d in degrees])
+    area = np.array(
+        [
+            [
+                mean(
+                    spread_modules(3),
+                    float(r),
+                    few,
+                    tilts=(-np.radians(d), 0.0, np.radians(d)),
+                    jacobian="forward",
+                )
+                for r in ratios
+            ]
+            for d in degrees
+        ]
+    )
     ridge = (2 / np.cos(np.radians(degrees)), degrees)
-    save_figure(map_figure(ratios, degrees, area, ("Figure 13: tilts -max, 0, +max", "split / offset",
-                                                   "largest tilt, deg"), ridge), FIGURES / "figure_13.png")
+    save_figure(
+        map_figure(
+            ratios,
+            degrees,
+            area,
+            ("Figure 13: tilts -max, 0, +max", "split / offset", "largest tilt, deg"),
+            ridge,
+        ),
+        FIGURES / "figure_13.png",
+    )
 
 
 def draw_tracking(effort: Effort, physical: list[tuple[str, AsocRun]]) -> None:
     corners = square_corners()
     known = [(f"sigma {s:g} cm", runs(s / 100, Knowledge(), FAST, effort)[0]) for s in TABLE_9]
-    save_figure(tracks_figure(corners, [(n, r.pose[:, :2]) for n, r in known], "Figure 29: 1.5 m/s, all known"),
-                FIGURES / "figure_29.png")
-    save_figure(speed_figure([(n, r.times[:-1], r.speed) for n, r in known[::3]], 1.5, "Figure 30: speed"),
-                FIGURES / "figure_30.png")
-    blind = [(f"{'0.5 Hz' if p else 'dead reckoning'}, ground {'known' if t else 'unknown'}",
-              runs(0.03, KNOWLEDGE[p, t], NO_SLIP, effort)[0].pose[:, :2]) for p, t in TABLE_10]
-    save_figure(tracks_figure(corners, blind, "Figure 31: sigma 3 cm, no slip"),
-                FIGURES / "figure_31.png")
+    save_figure(
+        tracks_figure(
+            corners, [(n, r.pose[:, :2]) for n, r in known], "Figure 29: 1.5 m/s, all known"
+        ),
+        FIGURES / "figure_29.png",
+    )
+    save_figure(
+        speed_figure([(n, r.times[:-1], r.speed) for n, r in known[::3]], 1.5, "Figure 30: speed"),
+        FIGURES / "figure_30.png",
+    )
+    blind = [
+        (
+            f"{'0.5 Hz' if p else 'dead reckoning'}, ground {'known' if t else 'unknown'}",
+            runs(0.03, KNOWLEDGE[p, t], NO_SLIP, effort)[0].pose[:, :2],
+        )
+        for p, t in TABLE_10
+    ]
+    save_figure(
+        tracks_figure(corners, blind, "Figure 31: sigma 3 cm, no slip"), FIGURES / "figure_31.png"
+    )
     level = [(name, run.pose[:, :2]) for name, run in physical if ", 0 cm" in name]
     if level:
-        save_figure(tracks_figure(corners, level, "Physics, level ground"), FIGURES / "physics_level.png")
+        save_figure(
+            tracks_figure(corners, level, "Physics, level ground"), FIGURES / "physics_level.png"
+        )
 
 
-def draw(effort: Effort, front: ParetoFront, design: AsocDesign, physical: list[tuple[str, AsocRun]]) -> None:
+def draw(
+    effort: Effort, front: ParetoFront, design: AsocDesign, physical: list[tuple[str, AsocRun]]
+) -> None:
     FIGURES.mkdir(parents=True, exist_ok=True)
     with in_style():
         draw_isotropy(effort)
@@ -264,9 +443,14 @@ def draw(effort: Effort, front: ParetoFront, design: AsocDesign, physical: list[
         twist = np.array([0.6, 0.6, 0.7])
         links = link_velocities(GEOMETRY.positions, twist)
         trailing = np.arctan2(links[:, 1], links[:, 0]) - np.arcsin(
-            GEOMETRY.offset * twist[2] / np.linalg.norm(links, axis=1))  # modules at rest against the body
-        save_figure(platform_figure(asoc_platform(GEOMETRY), steering=wheel_steering(GEOMETRY, trailing), twist=twist),
-                    FIGURES / "platform.png")
+            GEOMETRY.offset * twist[2] / np.linalg.norm(links, axis=1)
+        )  # modules at rest against the body
+        save_figure(
+            platform_figure(
+                asoc_platform(GEOMETRY), steering=wheel_steering(GEOMETRY, trailing), twist=twist
+            ),
+            FIGURES / "platform.png",
+        )
 
 
 NOTES = (
@@ -307,19 +491,35 @@ NOTES = (
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="coarser quadrature, fewer seeds, no physics")
+    parser.add_argument(
+        "--quick", action="store_true", help="coarser quadrature, fewer seeds, no physics"
+    )
     effort = QUICK if parser.parse_args(arguments).quick else FULL
     began = time.perf_counter()
     front_table, front, design = pareto(effort)
-    tables = [mobility(), table_1(effort), table_2(effort), figures_9_and_11(effort), table_4(), table_5(),
-              optimizers(effort), front_table, *tables_9_and_10(effort)]
+    tables = [
+        mobility(),
+        table_1(effort),
+        table_2(effort),
+        figures_9_and_11(effort),
+        table_4(),
+        table_5(),
+        optimizers(effort),
+        front_table,
+        *tables_9_and_10(effort),
+    ]
     physical: list[tuple[str, AsocRun]] = []
     if effort.physics:
         table, physical = physics(effort)
         tables += [table, physics_knowledge(effort)]
     draw(effort, front, design, physical)
     notes = (*NOTES, f"The page took {(time.perf_counter() - began) / 60:.1f} minutes.")
-    publish("asoc_tables" if effort is FULL else "asoc_tables_quick", tables, packages=PACKAGES, notes=notes)
+    publish(
+        "asoc_tables" if effort is FULL else "asoc_tables_quick",
+        tables,
+        packages=PACKAGES,
+        notes=notes,
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""What all benchmarks share: where and on what they ran, and how their tables are printed and kept."""
+"""What all benchmarks share: where and on what they ran, and how their tables are printed and
+kept."""
 
 from __future__ import annotations
 
@@ -34,7 +35,9 @@ def cpu() -> str:
     name = platform.processor() or platform.machine()
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        name = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), name)
+        name = next(
+            (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), name
+        )
     except OSError:
         pass
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
@@ -44,10 +47,22 @@ def cpu() -> str:
 def commit() -> str:
     """Commit of the checkout, "+" when it has changes; "unknown" outside git."""
     try:
-        head = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True,
-                              text=True, check=True, timeout=10).stdout.strip()
-        changed = subprocess.run(["git", "status", "--porcelain", "--untracked-files=no"], cwd=ROOT,
-                                 capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+        head = subprocess.run(
+            ["git", "rev-parse", "--short", "HEAD"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10,
+        ).stdout.strip()
+        changed = subprocess.run(
+            ["git", "status", "--porcelain", "--untracked-files=no"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=10,
+        ).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return "unknown"
     return head + ("+" if changed else "")
@@ -70,10 +85,14 @@ def provenance(packages: Sequence[str]) -> str:
     return f"{now}; commit {commit()}; {cpu()}; {versions(packages)}"
 
 
-def publish(name: str, tables: Sequence[ResultTable], *, packages: Sequence[str], notes: Sequence[str] = ()) -> Path:
-    """Print ``tables`` and write them to out/benchmarks/<name>.md and .csv; the Markdown file's path.
+def publish(
+    name: str, tables: Sequence[ResultTable], *, packages: Sequence[str], notes: Sequence[str] = ()
+) -> Path:
+    """Print ``tables`` and write them to out/benchmarks/<name>.md and .csv; the Markdown file's
+    path.
 
-    The CSV file holds all tables in one: a first column names the table, columns are the union of all headers.
+    The CSV file holds all tables in one: a first column names the table, columns are the union of
+    all headers.
     """
     console = Console(width=180)
     where = provenance(packages)
@@ -107,4 +126,10 @@ def _write_csv(path: Path, tables: Sequence[ResultTable], where: str) -> None:
         writer.writeheader()
         for table in tables:
             for row in table.rows:
-                writer.writerow({"table": table.title, **dict(zip(table.header, row, strict=True)), "run": where})
+                writer.writerow(
+                    {
+                        "table": table.title,
+                        **dict(zip(table.header, row, strict=True)),
+                        "run": where,
+                    }
+                )

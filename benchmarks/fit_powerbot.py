@@ -2,10 +2,11 @@
 
     python -m benchmarks.fit_powerbot [--quick] [--write]
 
-Start, goal and headings are met exactly. Inner knots and the two end rates are chosen by least squares from
-many starts, so that length and the unscaled maxima of speed, acceleration and deceleration (one second a
-segment) meet the print; the sliding speed of eq. 2.15 (sharpest bend) counts less. Ends keep a small speed
-along the heading: with none, as in the thesis's example, the curvature at the ends is infinite.
+Start, goal and headings are met exactly. Inner knots and the two end rates are chosen by least
+squares from many starts, so that length and the unscaled maxima of speed, acceleration and
+deceleration (one second a segment) meet the print; the sliding speed of eq. 2.15 (sharpest bend)
+counts less. Ends keep a small speed along the heading: with none, as in the thesis's example, the
+curvature at the ends is infinite.
 """
 
 from __future__ import annotations
@@ -27,11 +28,25 @@ from trajopt.robots.powerbot import FRICTION
 Array = NDArray[np.float64]
 ROOT = FilePath(__file__).resolve().parents[1]
 TABLE = ROOT / "tests" / "data" / "powerbot" / "experiments.csv"
-TARGETS = ("length", "unscaled_speed", "unscaled_acceleration", "unscaled_deceleration", "sliding_speed")
+TARGETS = (
+    "length",
+    "unscaled_speed",
+    "unscaled_acceleration",
+    "unscaled_deceleration",
+    "sliding_speed",
+)
 WEIGHT = 20.0  # one over 5 %, the aim
-SLIDING_WEIGHT = {1: 2.0, 2: 2.0, 4: 10.0, 5: 10.0}  # chosen: it binds only without the safety speed (4 and 5)
+SLIDING_WEIGHT = {
+    1: 2.0,
+    2: 2.0,
+    4: 10.0,
+    5: 10.0,
+}  # chosen: it binds only without the safety speed (4 and 5)
 RAMP_LENGTH, RAMP_HEIGHT = 4.29, 0.45  # m, thesis 004, section 4.4
-RAMP_FOOT, RAMP_DIRECTION = (-44.63, -30.4), math.radians(-91.0)  # m, rad; chosen: the straightest stretch
+RAMP_FOOT, RAMP_DIRECTION = (
+    (-44.63, -30.4),
+    math.radians(-91.0),
+)  # m, rad; chosen: the straightest stretch
 SAMPLES = 201
 
 
@@ -56,20 +71,42 @@ def cases() -> list[Case]:
             if row["experiment"] == "6":
                 continue
             at = {name: float(value) for name, value in row.items() if value}
-            printed = np.array([at["distance"], at["unscaled_v_max"], at["unscaled_a_max"],
-                                -at["unscaled_d_max"], at["v_slide"]])
-            found.append(Case(int(at["experiment"]), int(at["knots"]), np.array([at["start_x"], at["start_y"]]),
-                              np.array([at["goal_x"], at["goal_y"]]),
-                              (math.radians(at["heading_start"]), math.radians(at["heading_goal"])), printed, row))
+            printed = np.array(
+                [
+                    at["distance"],
+                    at["unscaled_v_max"],
+                    at["unscaled_a_max"],
+                    -at["unscaled_d_max"],
+                    at["v_slide"],
+                ]
+            )
+            found.append(
+                Case(
+                    int(at["experiment"]),
+                    int(at["knots"]),
+                    np.array([at["start_x"], at["start_y"]]),
+                    np.array([at["goal_x"], at["goal_y"]]),
+                    (math.radians(at["heading_start"]), math.radians(at["heading_goal"])),
+                    printed,
+                    row,
+                )
+            )
     return found
 
 
 def path_of(case: Case, x: Array) -> Path:
     """The path for inner knots and end rates ``x``."""
     knots = np.vstack([case.start, x[:-2].reshape(-1, 2), case.goal])
-    ends = [rate * np.array([math.cos(h), math.sin(h)]) for rate, h in zip(x[-2:], case.headings, strict=True)]
-    return Path.through(knots, knots=np.arange(case.knots, dtype=float), start_direction=ends[0],
-                        end_direction=ends[1])
+    ends = [
+        rate * np.array([math.cos(h), math.sin(h)])
+        for rate, h in zip(x[-2:], case.headings, strict=True)
+    ]
+    return Path.through(
+        knots,
+        knots=np.arange(case.knots, dtype=float),
+        start_direction=ends[0],
+        end_direction=ends[1],
+    )
 
 
 def measured(path: Path, samples: int = SAMPLES) -> tuple[Array, float]:
@@ -105,7 +142,9 @@ def fit(case: Case, starts: int, rng: np.random.Generator) -> Array:
     best: tuple[float, Array] = (math.inf, low)
     directions = [np.array([math.cos(h), math.sin(h)]) for h in case.headings]
     for _ in range(starts):
-        chord = np.linspace(case.start, case.goal, case.knots)[1:-1] + rng.normal(0, 1.5, (case.knots - 2, 2))
+        chord = np.linspace(case.start, case.goal, case.knots)[1:-1] + rng.normal(
+            0, 1.5, (case.knots - 2, 2)
+        )
         reach = rng.uniform(0.1, 0.4, 2) * case.printed[0]
         chord[0] = case.start + reach[0] * directions[0] + rng.normal(0, 0.1, 2)
         chord[-1] = case.goal - reach[1] * directions[1] + rng.normal(0, 0.1, 2)
@@ -126,41 +165,68 @@ def toml(case: Case, x: Array) -> str:
         f"# Thesis 004, experiment {case.number} (section 4). Knots between start and goal are only drawn: fitted",
         "# by benchmarks/fit_powerbot.py to the printed length and unscaled maxima; what is left is in [printed].",
         "# Lengths m, angles rad; x, y as in the thesis's map, yaw counter-clockwise.",
-        f'title = "Thesis 004, experiment {case.number}"', "", "[path]",
+        f'title = "Thesis 004, experiment {case.number}"',
+        "",
+        "[path]",
         "knots = [" + ", ".join(f"[{a:g}, {b:g}]" for a, b in knots) + "]  # inner ones fitted",
-        f"start_heading = {case.headings[0]:.6f}", f"goal_heading = {case.headings[1]:.6f}",
-        f"start_rate = {x[-2]:g}  # fitted", f"goal_rate = {x[-1]:g}  # fitted", "",
+        f"start_heading = {case.headings[0]:.6f}",
+        f"goal_heading = {case.headings[1]:.6f}",
+        f"start_rate = {x[-2]:g}  # fitted",
+        f"goal_rate = {x[-1]:g}  # fitted",
+        "",
     ]
     if case.number == 4:
-        lines += ["[[ramps]]  # section 4.4; its place is drawn only: chosen, the straightest stretch",
-                  f"foot = [{RAMP_FOOT[0]}, {RAMP_FOOT[1]}]", f"direction = {RAMP_DIRECTION:.6f}",
-                  f"length = {RAMP_LENGTH}", f"height = {RAMP_HEIGHT}", ""]
+        lines += [
+            "[[ramps]]  # section 4.4; its place is drawn only: chosen, the straightest stretch",
+            f"foot = [{RAMP_FOOT[0]}, {RAMP_FOOT[1]}]",
+            f"direction = {RAMP_DIRECTION:.6f}",
+            f"length = {RAMP_LENGTH}",
+            f"height = {RAMP_HEIGHT}",
+            "",
+        ]
     lines += ["[limits]", 'variant = "thesis"', f"speed = {row['v_robot']}"]
     if row["v_safety"]:
         lines.append(f"safety_speed = {row['v_safety']}")
-    lines += [f"acceleration = {row['a_robot']}", f"deceleration = {row['d_robot'].lstrip('-')}",
-              f"friction = {FRICTION}", "tip = true", "", "[printed]", f"length = {row['distance']}",
-              f"time = {row['time']}"]
-    lines += [f"{name} = {value:g}" for name, value in zip(TARGETS[1:], case.printed[1:], strict=True)]
-    shown = ", ".join(f"{name} = {value:.4f}" for name, value in zip(TARGETS, residuals, strict=True))
+    lines += [
+        f"acceleration = {row['a_robot']}",
+        f"deceleration = {row['d_robot'].lstrip('-')}",
+        f"friction = {FRICTION}",
+        "tip = true",
+        "",
+        "[printed]",
+        f"length = {row['distance']}",
+        f"time = {row['time']}",
+    ]
+    lines += [
+        f"{name} = {value:g}" for name, value in zip(TARGETS[1:], case.printed[1:], strict=True)
+    ]
+    shown = ", ".join(
+        f"{name} = {value:.4f}" for name, value in zip(TARGETS, residuals, strict=True)
+    )
     lines += ["fitted = true", f"residuals = {{ {shown} }}", ""]
     return "\n".join(lines)
 
 
 def main() -> None:
     """Fit, print, and write the files with --write."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--quick", action="store_true", help="few starts")
     parser.add_argument("--only", type=int, choices=sorted(SLIDING_WEIGHT), help="one experiment")
-    parser.add_argument("--write", action="store_true", help="write problems/powerbot/experiment_*.toml")
+    parser.add_argument(
+        "--write", action="store_true", help="write problems/powerbot/experiment_*.toml"
+    )
     arguments = parser.parse_args()
     for case in cases():
         if arguments.only not in (None, case.number):
             continue
         x = fit(case, 4 if arguments.quick else 70, np.random.default_rng(4))
         values, turning = measured(path_of(case, x), 2001)
-        shown = ", ".join(f"{name} {value / print_ - 1:+.1%}"
-                          for name, value, print_ in zip(TARGETS, values, case.printed, strict=True))
+        shown = ", ".join(
+            f"{name} {value / print_ - 1:+.1%}"
+            for name, value, print_ in zip(TARGETS, values, case.printed, strict=True)
+        )
         print(f"experiment {case.number}: {shown}; turns {math.degrees(turning):.0f} deg")
         if arguments.write:
             file = ROOT / "problems" / "powerbot" / f"experiment_{case.number}.toml"

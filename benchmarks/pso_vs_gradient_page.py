@@ -1,8 +1,9 @@
 """Bring docs/pso_vs_gradient.md up to date with the rows of a benchmark.
 
-Run as ``python -m benchmarks.pso_vs_gradient_page [STORE]`` after ``trajopt bench benchmarks/pso_vs_gradient.toml``.
-Replaces what stands between the markers of the page (tables) and its three pictures; the words around them are
-written by hand, so read them again. The whole report (CSV, SVG, every table) goes to STORE/report.
+Run as ``python -m benchmarks.pso_vs_gradient_page [STORE]`` after ``trajopt bench
+benchmarks/pso_vs_gradient.toml``. Replaces what stands between the markers of the page (tables) and
+its three pictures; the words around them are written by hand, so read them again. The whole report
+(CSV, SVG, every table) goes to STORE/report.
 """
 
 from __future__ import annotations
@@ -11,7 +12,14 @@ import argparse
 from pathlib import Path
 
 from benchmarks.common import ROOT
-from trajopt.report.bench import answer_lines, peer_lines, run_line, share_lines, small_picture, write_report
+from trajopt.report.bench import (
+    answer_lines,
+    peer_lines,
+    run_line,
+    share_lines,
+    small_picture,
+    write_report,
+)
 from trajopt.study.bench_tables import BenchTables
 from trajopt.study.store import open_store
 
@@ -22,19 +30,27 @@ PICTURES = ("families", "ecdf", "profiles")
 def main() -> None:
     """Rewrite the generated parts of the page."""
     parser = argparse.ArgumentParser(description="Generated parts of docs/pso_vs_gradient.md.")
-    parser.add_argument("store", nargs="?", type=Path, default=ROOT / "out" / "bench" / "pso_vs_gradient")
+    parser.add_argument(
+        "store", nargs="?", type=Path, default=ROOT / "out" / "bench" / "pso_vs_gradient"
+    )
     store = open_store(parser.parse_args().store, create=False)
     report = store.path / "report"
     write_report(store, report)
     tables = BenchTables(store.frame().to_dict("records"))
-    parts = {"run": [run_line(store, tables)], "answers": answer_lines(tables), "shares": share_lines(tables, report),
-             "peers": peer_lines(tables)}
+    parts = {
+        "run": [run_line(store, tables)],
+        "answers": answer_lines(tables),
+        "shares": share_lines(tables, report),
+        "peers": peer_lines(tables),
+    }
     text = PAGE.read_text(encoding="utf-8")
     for name, lines in parts.items():
         text = replaced(text, name, "\n".join(lines))
     PAGE.write_text(text, encoding="utf-8")
     for name in PICTURES:
-        small_picture(report / f"{name}.png", PAGE.parent / "pictures" / f"pso_vs_gradient_{name}.png")
+        small_picture(
+            report / f"{name}.png", PAGE.parent / "pictures" / f"pso_vs_gradient_{name}.png"
+        )
 
 
 def replaced(text: str, name: str, new: str) -> str:

@@ -1,7 +1,8 @@
 """The pictures that README.md shows.
 
-    python -m benchmarks.readme_pictures                                rewrites docs/pictures/ but for the sweep
-    python -m benchmarks.readme_pictures --climb out/sweeps/climb_rate  the two of the climb rate study, from its store
+python -m benchmarks.readme_pictures                                rewrites docs/pictures/ but for
+the sweep python -m benchmarks.readme_pictures --climb out/sweeps/climb_rate  the two of the climb
+rate study, from its store
 """
 
 from __future__ import annotations
@@ -40,16 +41,26 @@ def climb_rates(store: Path) -> None:
     """Draw the climb rate study from its store, and say its main numbers."""
     frame = open_store(store, create=False).frame()
     with in_style():
-        for name, figure in (("climb_rate_map.png", rate_maps(frame)), ("climb_rate_lines.png", rate_lines(frame))):
+        for name, figure in (
+            ("climb_rate_map.png", rate_maps(frame)),
+            ("climb_rate_lines.png", rate_lines(frame)),
+        ):
             print(f"wrote {save_figure(figure, FOLDER / name)}")
     sound = frame[frame["status"] == "done"].dropna(subset=["climbed"])
     print(f"{len(frame)} rows, {len(sound)} trials count")
     for column in ("obstacle.height", "friction", "heading_error", "torque"):
-        print(sound.pivot_table(index=column, columns="configuration", values="climbed").mul(100).round(1).to_string())
+        print(
+            sound.pivot_table(index=column, columns="configuration", values="climbed")
+            .mul(100)
+            .round(1)
+            .to_string()
+        )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--climb", type=Path, help="store of problems/sweeps/climb_rate.toml")
     options = parser.parse_args()
     FOLDER.mkdir(parents=True, exist_ok=True)

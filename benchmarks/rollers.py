@@ -1,7 +1,8 @@
 """Deviation from kinematics and speed of the roller-level simulators (SMDW thesis, section 5.3).
 
-Run as ``python -m benchmarks.rollers``: drives LOC8 5 m forward, lateral and diagonal at 1 to 5 km/h, on
-Mecanum and SMDW wheels, with every roller shape, in every engine. ``--quick`` takes 3 km/h only.
+Run as ``python -m benchmarks.rollers``: drives LOC8 5 m forward, lateral and diagonal at 1 to 5
+km/h, on Mecanum and SMDW wheels, with every roller shape, in every engine. ``--quick`` takes 3 km/h
+only.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ DISTANCE = 5.0  # m, SMDW thesis section 5.3
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0)  # km/h, SMDW thesis Table 5.1
 QUICK_SPEEDS = (3.0,)  # km/h, the thesis's climbing speed
 WHEELS = ("Mecanum", "SMDW")
-# A shape is called good where it stays within this share along and across in all its runs (chosen: the
-# accuracy asked of the SMDW in pybullet).
+# A shape is called good where it stays within this share along and across in all its runs (chosen:
+# the accuracy asked of the SMDW in pybullet).
 GOOD = 0.03
 KMH = 1.0 / 3.6  # m/s
 
@@ -51,7 +52,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Row:
-    """One run made: shares of the distance, yaw error, ripple of the wheel speed, speed of the engine."""
+    """One run made: shares of the distance, yaw error, ripple of the wheel speed, speed of the
+    engine."""
 
     case: Case
     along: float
@@ -83,11 +85,14 @@ def measure(case: Case) -> Row:
     run = make_engine(case.engine).run(robot, Scene(), command)
     off = deviation(run, direction, DISTANCE)
     ripple, saturated = _effort(run, command, robot.torque_limit)
-    return Row(case, off.along, off.across, off.yaw, ripple, saturated, run.real_time_factor, run.reason)
+    return Row(
+        case, off.along, off.across, off.yaw, ripple, saturated, run.real_time_factor, run.reason
+    )
 
 
 def _effort(run: Recording, command: Command, limit: float) -> tuple[float, float]:
-    """Ripple of the driven wheels at full speed, and the share of time with a wheel at its torque limit."""
+    """Ripple of the driven wheels at full speed, and the share of time with a wheel at its torque
+    limit."""
     steady = (run.times > command.times[1]) & (run.times < command.times[-2])
     wanted = command.wheel_speeds[1]
     driven = np.abs(wanted) > 1e-6
@@ -154,7 +159,11 @@ def summary(rows: Sequence[Row]) -> list[tuple[str, ...]]:
 def conditions() -> list[str]:
     """Versions and machine, one line each."""
     names = ("trajopt", "pybullet", "mujoco", "numpy")
-    return [*(f"{name} {_version(name)}" for name in names), f"Python {platform.python_version()}", _cpu()]
+    return [
+        *(f"{name} {_version(name)}" for name in names),
+        f"Python {platform.python_version()}",
+        _cpu(),
+    ]
 
 
 def _version(name: str) -> str:
@@ -168,7 +177,11 @@ def _cpu() -> str:
     info = Path("/proc/cpuinfo")
     lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
     models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return f"{models[0]}, {len(models)} cores" if models else platform.processor() or platform.machine()
+    return (
+        f"{models[0]}, {len(models)} cores"
+        if models
+        else platform.processor() or platform.machine()
+    )
 
 
 def write(rows: Sequence[Row], folder: Path) -> None:
@@ -210,8 +223,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.rollers", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="3 km/h only")
-    parser.add_argument("--engine", choices=ENGINES, action="append", help="only this engine (repeatable)")
-    parser.add_argument("--out", type=Path, default=Path("out/benchmarks"), help="folder of the results")
+    parser.add_argument(
+        "--engine", choices=ENGINES, action="append", help="only this engine (repeatable)"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/benchmarks"), help="folder of the results"
+    )
     chosen = parser.parse_args(arguments)
     console = Console()
     todo = cases(QUICK_SPEEDS if chosen.quick else SPEEDS, chosen.engine or ENGINES)

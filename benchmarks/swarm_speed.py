@@ -1,7 +1,8 @@
 """Speed of swarm evaluation and of the whole PSO search, beside NumPy, pyswarms and pymoo.
 
-Run as ``python -m benchmarks.swarm_speed``. ``--quick`` repeats less. Each figure is the least of several
-repeats in CPU time of this process on one thread, which other load on the machine disturbs little.
+Run as ``python -m benchmarks.swarm_speed``. ``--quick`` repeats less. Each figure is the least of
+several repeats in CPU time of this process on one thread, which other load on the machine disturbs
+little.
 """
 
 from __future__ import annotations
@@ -31,11 +32,17 @@ PACKAGES = ("trajopt", "numpy", "numba", "pyswarms", "pymoo")
 PARTICLES, ITERATIONS = 50, 500  # thesis 000, Table 5.8
 OVERHEAD = (40, 20, 500)  # particles, dimension, iterations
 EQUAL = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # Clerc and Kennedy 2002
-MINIMUM = {"numpy": 20.0, "numpy, heading free": 20.0, "search": 10.0, "overhead": 2.0}  # what the ratios are to reach
+MINIMUM = {
+    "numpy": 20.0,
+    "numpy, heading free": 20.0,
+    "search": 10.0,
+    "overhead": 2.0,
+}  # what the ratios are to reach
 
 
 def best_of(function: Callable[[], Any], repeats: int) -> float:
-    """Least CPU seconds of ``repeats`` calls, each of several runs where one is too short to measure."""
+    """Least CPU seconds of ``repeats`` calls, each of several runs where one is too short to
+    measure."""
     function()
     started = time.perf_counter()
     function()
@@ -65,11 +72,17 @@ def kernels(repeats: int) -> tuple[list[tuple[str, ...]], list[float]]:
         readable = best_of(partial(_numpy_cost, asked, z), max(3, repeats // 10))
         fast = best_of(partial(asked.evaluate, z), repeats)
         points = asked.control_points(z.T)
-        general = best_of(lambda a=asked, p=points: compiled.roll_out_swarm(  # type: ignore[misc]
-            step_grid(a.basis, a.steps), a.model, a.actuator, p.x, p.y, p.yaw, p.duration), max(3, repeats // 4))
+        general = best_of(
+            lambda a=asked, p=points: compiled.roll_out_swarm(  # type: ignore[misc]
+                step_grid(a.basis, a.steps), a.model, a.actuator, p.x, p.y, p.yaw, p.duration
+            ),
+            max(3, repeats // 4),
+        )
         error = float(np.max(np.abs(asked.evaluate(z).cost - _numpy_cost(asked, z))))
         times = (f"{seconds * 1e3:.3f}" for seconds in (readable, general, fast))
-        rows.append(("+".join(free), str(asked.steps), *times, f"{readable / fast:.1f}", f"{error:.1e}"))
+        rows.append(
+            ("+".join(free), str(asked.steps), *times, f"{readable / fast:.1f}", f"{error:.1e}")
+        )
         ratios.append(readable / fast)
     return rows, ratios
 
@@ -79,8 +92,15 @@ def _numpy_cost(asked: TerminalObjective, z: Array) -> Array:
     from trajopt.objectives.rollout import roll_out
 
     points = asked.control_points(z.T)
-    end = roll_out(step_grid(asked.basis, asked.steps), asked.model, asked.actuator, points.x, points.y, points.yaw,
-                   points.duration)
+    end = roll_out(
+        step_grid(asked.basis, asked.steps),
+        asked.model,
+        asked.actuator,
+        points.x,
+        points.y,
+        points.yaw,
+        points.duration,
+    )
     terms = [np.broadcast_to(t, (1, len(z)))[0] for t in asked.named_terms(end).values()]
     return np.asarray(np.sum(terms, axis=0))
 
@@ -90,22 +110,36 @@ def searches(repeats: int) -> tuple[list[tuple[str, ...]], float]:
     asked = objective("p2")
     budget = Budget(PARTICLES * ITERATIONS)
     ours = best_of(lambda: minimize(asked, asked.bounds, optimizer="pso", budget=budget), repeats)
-    peer = best_of(lambda: _pyswarms(partial(_numpy_cost, asked), asked.bounds, PARTICLES, ITERATIONS),
-                   max(1, repeats // 3))
-    fair = best_of(lambda: _pyswarms(lambda x: asked.evaluate(x).cost, asked.bounds, PARTICLES, ITERATIONS), repeats)
-    rows = [("trajopt pso", f"{ours:.3f}", "1.0"), ("pyswarms, NumPy objective", f"{peer:.3f}", f"{peer / ours:.1f}"),
-            ("pyswarms, our compiled objective", f"{fair:.3f}", f"{fair / ours:.1f}")]
+    peer = best_of(
+        lambda: _pyswarms(partial(_numpy_cost, asked), asked.bounds, PARTICLES, ITERATIONS),
+        max(1, repeats // 3),
+    )
+    fair = best_of(
+        lambda: _pyswarms(lambda x: asked.evaluate(x).cost, asked.bounds, PARTICLES, ITERATIONS),
+        repeats,
+    )
+    rows = [
+        ("trajopt pso", f"{ours:.3f}", "1.0"),
+        ("pyswarms, NumPy objective", f"{peer:.3f}", f"{peer / ours:.1f}"),
+        ("pyswarms, our compiled objective", f"{fair:.3f}", f"{fair / ours:.1f}"),
+    ]
     return rows, peer / ours
 
 
 def overhead(repeats: int) -> tuple[list[tuple[str, ...]], float]:
-    """Rows for 40 particles x 20-D x 500 iterations on the sphere, and the ratio pyswarms / ours."""
+    """Rows for 40 particles x 20-D x 500 iterations on the sphere, and the ratio pyswarms /
+    ours."""
     n, d, iterations = OVERHEAD
     box = np.tile([-5.0, 5.0], (d, 1))
     own = replace(ParticleSwarm(), particles=n)
-    ours = best_of(lambda: minimize(_sphere, box, optimizer=own, budget=Budget(n * iterations)), repeats)
+    ours = best_of(
+        lambda: minimize(_sphere, box, optimizer=own, budget=Budget(n * iterations)), repeats
+    )
     peer = best_of(lambda: _pyswarms(_sphere, box, n, iterations), repeats)
-    rows = [("trajopt pso, history kept", f"{ours:.4f}", "1.0"), ("pyswarms", f"{peer:.4f}", f"{peer / ours:.2f}")]
+    rows = [
+        ("trajopt pso, history kept", f"{ours:.4f}", "1.0"),
+        ("pyswarms", f"{peer:.4f}", f"{peer / ours:.2f}"),
+    ]
     try:
         other = best_of(lambda: _pymoo(box, n, iterations), 1)
         rows.append(("pymoo", f"{other:.4f}", f"{other / ours:.1f}"))
@@ -122,7 +156,9 @@ def _pyswarms(function: Callable[[Array], Array], box: Array, n: int, iterations
     from pyswarms.single.global_best import GlobalBestPSO
 
     np.random.seed(0)  # noqa: NPY002 - the only seed pyswarms knows
-    cost, _ = GlobalBestPSO(n, len(box), EQUAL, bounds=tuple(box.T)).optimize(function, iterations, verbose=False)
+    cost, _ = GlobalBestPSO(n, len(box), EQUAL, bounds=tuple(box.T)).optimize(
+        function, iterations, verbose=False
+    )
     return float(cost)
 
 
@@ -148,15 +184,41 @@ def main() -> None:
     search_rows, search_ratio = searches(max(2, repeats // 10))
     overhead_rows, overhead_ratio = overhead(max(3, repeats // 6))
     tables = [
-        ResultTable(f"One batch of {PARTICLES} particles, ms", (
-            "free", "steps", "NumPy", "general kernel", "evaluate", "NumPy / evaluate", "difference"), kernel_rows),
-        ResultTable(f"Whole search, {PARTICLES} x {ITERATIONS}, s", ("search", "seconds", "ratio"), search_rows),
-        ResultTable("Overhead, {} x {}-D x {}, s".format(*OVERHEAD), ("package", "seconds", "ratio"), overhead_rows),
+        ResultTable(
+            f"One batch of {PARTICLES} particles, ms",
+            (
+                "free",
+                "steps",
+                "NumPy",
+                "general kernel",
+                "evaluate",
+                "NumPy / evaluate",
+                "difference",
+            ),
+            kernel_rows,
+        ),
+        ResultTable(
+            f"Whole search, {PARTICLES} x {ITERATIONS}, s",
+            ("search", "seconds", "ratio"),
+            search_rows,
+        ),
+        ResultTable(
+            "Overhead, {} x {}-D x {}, s".format(*OVERHEAD),
+            ("package", "seconds", "ratio"),
+            overhead_rows,
+        ),
     ]
-    ratios = {"numpy": numpy_ratios[0], "numpy, heading free": numpy_ratios[-1], "search": search_ratio,
-              "overhead": overhead_ratio}
-    notes = [f"{name}: {value:.1f} times, wanted {MINIMUM[name]:g}: "
-             f"{'holds' if value >= MINIMUM[name] else 'FALLS SHORT'}" for name, value in ratios.items()]
+    ratios = {
+        "numpy": numpy_ratios[0],
+        "numpy, heading free": numpy_ratios[-1],
+        "search": search_ratio,
+        "overhead": overhead_ratio,
+    }
+    notes = [
+        f"{name}: {value:.1f} times, wanted {MINIMUM[name]:g}: "
+        f"{'holds' if value >= MINIMUM[name] else 'FALLS SHORT'}"
+        for name, value in ratios.items()
+    ]
     publish("swarm_speed", tables, packages=PACKAGES, notes=notes)
 
 

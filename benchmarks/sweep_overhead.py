@@ -2,12 +2,13 @@
 
     python -m benchmarks.sweep_overhead [--quick] [--part pool|dask|million]
 
-Cases wait 5 ms each. Overhead a case = (wall time x workers - work) / cases, taken from the difference between a
-long and a short sweep, so that the start of workers cancels; work is the sum of the times that the cases themselves
-took, so that a late timer is not counted. Such pairs are repeated; the table shows median, least and largest. Waiting
-costs no processor time, so the processor time a case, of all processes together, is overhead too. A bare pool that
-only runs the cases is measured the same way. Ours also writes every row to disk; the others return results in memory.
-``--part million`` plans, runs and reads 1,000,000 empty cases.
+Cases wait 5 ms each. Overhead a case = (wall time x workers - work) / cases, taken from the
+difference between a long and a short sweep, so that the start of workers cancels; work is the sum
+of the times that the cases themselves took, so that a late timer is not counted. Such pairs are
+repeated; the table shows median, least and largest. Waiting costs no processor time, so the
+processor time a case, of all processes together, is overhead too. A bare pool that only runs the
+cases is measured the same way. Ours also writes every row to disk; the others return results in
+memory. ``--part million`` plans, runs and reads 1,000,000 empty cases.
 """
 
 from __future__ import annotations
@@ -60,7 +61,9 @@ def ours(cases: int, engine: Engine) -> tuple[float, float]:
     """Wall time of a whole sweep and work in it, s."""
     with tempfile.TemporaryDirectory() as folder:
         begun = time.perf_counter()
-        store = sweep([{"x": i} for i in range(cases)], paced, executor=engine, store=Path(folder) / "store")
+        store = sweep(
+            [{"x": i} for i in range(cases)], paced, executor=engine, store=Path(folder) / "store"
+        )
         wall = time.perf_counter() - begun
         values = store.frame()["value"].to_numpy()
     assert len(values) == cases
@@ -88,8 +91,16 @@ def dask(cases: int, chunk: int) -> tuple[float, float]:
     from distributed import Client, LocalCluster
 
     begun = time.perf_counter()
-    with (LocalCluster(n_workers=WORKERS, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
-                       silence_logs=40) as cluster, Client(cluster) as client):
+    with (
+        LocalCluster(
+            n_workers=WORKERS,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            silence_logs=40,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
         blocks = [list(range(i, min(i + chunk, cases))) for i in range(0, cases, chunk)]
         values = client.gather(client.map(_paced_many, blocks, pure=False))
     return time.perf_counter() - begun, float(np.sum([v for b in values for v in b]))
@@ -97,7 +108,8 @@ def dask(cases: int, chunk: int) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Trial:
-    """A way to run cases: their number -> wall time and work, s. ``pairs`` of a short and a ``long`` run."""
+    """A way to run cases: their number -> wall time and work, s. ``pairs`` of a short and a
+    ``long`` run."""
 
     name: str
     run: Callable[[int], tuple[float, float]]
@@ -120,7 +132,8 @@ DASK = (
 
 
 def cpu_seconds() -> float:
-    """CPU time of this process and of its ended children: unlike wall time, not changed by what else runs."""
+    """CPU time of this process and of its ended children: unlike wall time, not changed by what
+    else runs."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(u.ru_utime + u.ru_stime for u in used)
 
@@ -135,16 +148,35 @@ def overhead_table(name: str, trials: tuple[Trial, ...], quick: bool) -> ResultT
             rows.append((trial.name, "not installed", str(error), "", "", "", ""))
             continue
         lost, cpu, start, took = (sorted(column) for column in zip(*pairs, strict=True))
-        rows.append((trial.name, f"{statistics.median(lost):.3f}", f"{lost[0]:.3f} .. {lost[-1]:.3f}",
-                     f"{statistics.median(cpu):.3f}", f"{statistics.median(start):.2f}",
-                     f"{statistics.median(took):.2f}", str(len(pairs))))
-    return ResultTable(f"{name}: {WORKERS} workers, cases of 5 ms (target <= {TARGET} ms a case)",
-                       ("engine", "overhead a case, ms", "least .. largest", "CPU time a case, ms",
-                        "start and end, s", "a case took, ms", "pairs"), rows)
+        rows.append(
+            (
+                trial.name,
+                f"{statistics.median(lost):.3f}",
+                f"{lost[0]:.3f} .. {lost[-1]:.3f}",
+                f"{statistics.median(cpu):.3f}",
+                f"{statistics.median(start):.2f}",
+                f"{statistics.median(took):.2f}",
+                str(len(pairs)),
+            )
+        )
+    return ResultTable(
+        f"{name}: {WORKERS} workers, cases of 5 ms (target <= {TARGET} ms a case)",
+        (
+            "engine",
+            "overhead a case, ms",
+            "least .. largest",
+            "CPU time a case, ms",
+            "start and end, s",
+            "a case took, ms",
+            "pairs",
+        ),
+        rows,
+    )
 
 
 def _pair(trial: Trial, long: int) -> tuple[float, float, float, float]:
-    """Overhead a case (ms), processor time a case (ms), start and end (s), time that a case itself took (ms)."""
+    """Overhead a case (ms), processor time a case (ms), start and end (s), time that a case itself
+    took (ms)."""
     before = cpu_seconds()
     wall, work = trial.run(SHORT)
     middle = cpu_seconds()
@@ -156,7 +188,8 @@ def _pair(trial: Trial, long: int) -> tuple[float, float, float, float]:
 
 
 class PeakMemory:
-    """Largest sum of proportional memory of this process and all below it, sampled twice a second, bytes."""
+    """Largest sum of proportional memory of this process and all below it, sampled twice a second,
+    bytes."""
 
     def __init__(self) -> None:
         self.peak, self._end = 0, threading.Event()
@@ -209,13 +242,23 @@ def million_table(cases: int) -> ResultTable:
         rows.append(("all", f"{time.perf_counter() - begun:.1f}"))
     rows.append(("peak memory of all processes, GB", f"{memory.peak / 1e9:.2f}"))
     shutil.rmtree(folder)
-    return ResultTable(f"{cases} empty cases on {WORKERS} workers (target <= 30 min, 2 GB)", ("step", "s"), rows)
+    return ResultTable(
+        f"{cases} empty cases on {WORKERS} workers (target <= 30 min, 2 GB)", ("step", "s"), rows
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="few cases, one pair, and 20,000 empty ones")
-    parser.add_argument("--part", choices=("pool", "dask", "million"), help="one part; its own files in out/benchmarks")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="few cases, one pair, and 20,000 empty ones"
+    )
+    parser.add_argument(
+        "--part",
+        choices=("pool", "dask", "million"),
+        help="one part; its own files in out/benchmarks",
+    )
     options = parser.parse_args()
     tables = []
     if options.part in (None, "pool"):
@@ -224,8 +267,11 @@ def main() -> None:
         tables.append(overhead_table("Dask, and one by one", DASK, options.quick))
     if options.part in (None, "million"):
         tables.append(million_table(20_000 if options.quick else 1_000_000))
-    publish("sweep_overhead" + (f"_{options.part}" if options.part else ""), tables,
-            packages=("numpy", "pyarrow", "joblib", "distributed"))
+    publish(
+        "sweep_overhead" + (f"_{options.part}" if options.part else ""),
+        tables,
+        packages=("numpy", "pyarrow", "joblib", "distributed"),
+    )
 
 
 if __name__ == "__main__":

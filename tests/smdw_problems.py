@@ -7,7 +7,9 @@ from pathlib import Path
 from trajopt.problem import Problem, load_problem, problem_kind
 
 ROOT = Path(__file__).parent.parent
-SMDW = sorted(path.stem for path in (ROOT / "problems/smdw").glob("*.toml") if problem_kind(path) == "search")
+SMDW = sorted(
+    path.stem for path in (ROOT / "problems/smdw").glob("*.toml") if problem_kind(path) == "search"
+)
 
 
 def smdw_problem(name: str) -> Problem:

@@ -15,8 +15,14 @@ RUN = "from trajopt.cli import main; main()"
 
 
 def trajopt(*arguments):
-    return subprocess.run([sys.executable, "-c", RUN, *map(str, arguments)], cwd=ROOT, capture_output=True, text=True,
-                          timeout=300, check=False)
+    return subprocess.run(
+        [sys.executable, "-c", RUN, *map(str, arguments)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +55,21 @@ def test_a_solution_that_does_not_hold_exits_with_one():
     assert "does not hold" in done.stdout
 
 
-@pytest.mark.parametrize(("arguments", "words"), [
-    (("solve", "nowhere.toml"), "existing problem file"),
-    (("solve", SCENARIO, "--set", "limits.sped=1"), "nearest is 'speed'"),
-    (("solve", SCENARIO, "--set", "limits"), "key=value"),
-    (("solve", SCENARIO, "--optimizer", "magic"), "one of pso"),
-    (("solve", SCENARIO, "--seed", "-1"), "whole number"),
-    (("solve", SCENARIO, "--seconds", "0"), "time > 0"),
-    (("solve", "problems/powerbot/experiment_1.toml"), "load_path_problem"),
-    (("validate", "nowhere"), "nowhere"),
-    (("explain", SCENARIO, "--set", "spline.duration=0"), "spline.duration"),
-    (("explain", SCENARIO, "--engine", "toppra"), "--engine"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("solve", "nowhere.toml"), "existing problem file"),
+        (("solve", SCENARIO, "--set", "limits.sped=1"), "nearest is 'speed'"),
+        (("solve", SCENARIO, "--set", "limits"), "key=value"),
+        (("solve", SCENARIO, "--optimizer", "magic"), "one of pso"),
+        (("solve", SCENARIO, "--seed", "-1"), "whole number"),
+        (("solve", SCENARIO, "--seconds", "0"), "time > 0"),
+        (("solve", "problems/powerbot/experiment_1.toml"), "load_path_problem"),
+        (("validate", "nowhere"), "nowhere"),
+        (("explain", SCENARIO, "--set", "spline.duration=0"), "spline.duration"),
+        (("explain", SCENARIO, "--engine", "toppra"), "--engine"),
+    ],
+)
 def test_unusable_input_is_one_line_and_exit_two(arguments, words):
     done = trajopt(*arguments)
     assert done.returncode == 2
@@ -70,7 +79,9 @@ def test_unusable_input_is_one_line_and_exit_two(arguments, words):
 
 
 def test_x0_from_a_saved_solution(solved):
-    done = trajopt("solve", SCENARIO, "--optimizer", "nelder-mead", "--x0", solved, "--evaluations", 50)
+    done = trajopt(
+        "solve", SCENARIO, "--optimizer", "nelder-mead", "--x0", solved, "--evaluations", 50
+    )
     assert done.returncode == 0, done.stdout
 
 

@@ -29,25 +29,35 @@ def test_every_problem_holds(problem):
 
 
 def test_time_scaling_keeps_wheel_angles(problem):
-    """Integrated wheel speeds at the end equal the planned angles (1e-6 rad), by an independent quadrature."""
+    """Integrated wheel speeds at the end equal the planned angles (1e-6 rad), by an independent
+    quadrature."""
     trajectory = solve(problem).trajectory
     times = np.linspace(0, trajectory.duration, 40_001)
     speeds = trajectory.at(times).wheel_speeds
     integrated = np.trapezoid(speeds, times, axis=0)
-    np.testing.assert_allclose(integrated, trajectory.at(trajectory.duration).wheel_angles[0], atol=1e-6)
+    np.testing.assert_allclose(
+        integrated, trajectory.at(trajectory.duration).wheel_angles[0], atol=1e-6
+    )
 
 
 def test_time_scaling_is_never_slower_than_linear(problem):
     path, limits = solve(problem).path, problem.limits.as_limits()
     robot = solve(problem).trajectory.robot
     linear = time_scale(path, limits, robot=robot, engine="linear")
-    optimal = time_scale(path, limits, robot=robot, start_speed=float(linear.sd[0]), end_speed=float(linear.sd[-1]))
+    optimal = time_scale(
+        path, limits, robot=robot, start_speed=float(linear.sd[0]), end_speed=float(linear.sd[-1])
+    )
     assert optimal.duration <= linear.duration * (1 + 1e-9)
 
 
 def test_through_actuators_the_motion_is_nominal(scenario):
-    problem = scenario.replace({"actuator.enabled": True, "spline.free": ["p1", "p2", "heading"],
-                                "limits": {"wheel_speed": 100.0}})
+    problem = scenario.replace(
+        {
+            "actuator.enabled": True,
+            "spline.free": ["p1", "p2", "heading"],
+            "limits": {"wheel_speed": 100.0},
+        }
+    )
     solution = solve(problem)
     assert solution.trajectory.engine == "nominal"
     assert solution.duration == pytest.approx(problem.spline.duration, rel=1e-9)
@@ -112,9 +122,11 @@ def test_missing_engine_is_named(scenario, monkeypatch):
 
 
 def test_import_is_light_and_lazy():
-    code = ("import sys, time; t = time.perf_counter(); import trajopt; d = time.perf_counter() - t;"
-            "heavy = {'casadi', 'pybullet', 'matplotlib', 'toppra', 'mujoco', 'numba', 'pandas'} & set(sys.modules);"
-            "assert not heavy, heavy; assert d < 0.3, d")
+    code = (
+        "import sys, time; t = time.perf_counter(); import trajopt; d = time.perf_counter() - t;"
+        "heavy = {'casadi', 'pybullet', 'matplotlib', 'toppra', 'mujoco', 'numba', 'pandas'} & set(sys.modules);"
+        "assert not heavy, heavy; assert d < 0.3, d"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
@@ -127,7 +139,9 @@ def test_public_names_survive_importing_every_module():
     for _ in range(2):
         assert trajopt.load_problem(ROOT / "problems/smdw/scenario_2_forward35.toml") == problem
         solution = trajopt.solve(problem)
-        assert trajopt.minimize(lambda x: x[0] ** 2, [[-1, 1]], budget=trajopt.Budget(100)).fun < 0.1
+        assert (
+            trajopt.minimize(lambda x: x[0] ** 2, [[-1, 1]], budget=trajopt.Budget(100)).fun < 0.1
+        )
         limits, robot = problem.limits.as_limits(), solution.trajectory.robot
         assert trajopt.time_scale(solution.path, limits, robot=robot).duration > 0
     for name in trajopt.__all__:

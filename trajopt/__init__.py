@@ -1,6 +1,7 @@
 """trajopt plans, times and checks motions of wheeled ground robots as optimisation problems.
 
-Everything public is reachable from here and is loaded when first used, so importing the package is cheap.
+Everything public is reachable from here and is loaded when first used, so importing the package is
+cheap.
 """
 
 from __future__ import annotations

@@ -12,11 +12,14 @@ class TrajoptError(Exception):
     """Base of every error that trajopt raises on purpose."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Worker processes send errors by pickle, which would call the class with its message alone."""
+        """Worker processes send errors by pickle, which would call the class with its message
+        alone."""
         return _restored, (type(self), self.args, dict(self.__dict__))
 
 
-def _restored(kind: type[TrajoptError], args: tuple[Any, ...], fields: dict[str, Any]) -> TrajoptError:
+def _restored(
+    kind: type[TrajoptError], args: tuple[Any, ...], fields: dict[str, Any]
+) -> TrajoptError:
     error = kind.__new__(kind, *args)
     error.__dict__.update(fields)
     return error
@@ -75,10 +78,13 @@ class SimulationError(TrajoptError):
 
 
 def as_numbers(argument: str, value: Any, expected: str) -> NDArray[np.float64]:
-    """``value`` as an array of real numbers. Raises ArgumentError, saying what was ``expected``, where it is none."""
+    """``value`` as an array of real numbers. Raises ArgumentError, saying what was ``expected``,
+    where it is none."""
     try:
         array = np.asarray(value)
-        if array.dtype.kind in "biuf" or array.dtype == object or array.size == 0:  # no text, no complex numbers
+        if (
+            array.dtype.kind in "biuf" or array.dtype == object or array.size == 0
+        ):  # no text, no complex numbers
             return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
         pass

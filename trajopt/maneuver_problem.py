@@ -1,7 +1,8 @@
-"""Manoeuvre problems: an obstacle, a start and a space; the planner decides how to meet the obstacle.
+"""Manoeuvre problems: an obstacle, a start and a space; the planner decides how to meet the
+obstacle.
 
-The table [obstacle] tells these files from other problem files. Lengths are metres, angles radians, times
-seconds; axes right-handed, yaw counter-clockwise.
+The table [obstacle] tells these files from other problem files. Lengths are metres, angles radians,
+times seconds; axes right-handed, yaw counter-clockwise.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ class ManeuverRobot(Section):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         if self.minor_radius > WHEEL_RADIUS:
-            raise broken_rule("minor_radius", self.minor_radius, f"a length up to the radius {WHEEL_RADIUS} m")
+            raise broken_rule(
+                "minor_radius", self.minor_radius, f"a length up to the radius {WHEEL_RADIUS} m"
+            )
         return self
 
     @property
@@ -58,7 +61,9 @@ class ObstacleSection(Section):
     """A step across the whole space."""
 
     height: Positive = Field(description="m")
-    place: tuple[float, float] = Field(description="x, y on its edge where the leading wheel shall meet it, m")
+    place: tuple[float, float] = Field(
+        description="x, y on its edge where the leading wheel shall meet it, m"
+    )
     direction: float = Field(0.0, description="yaw of its normal, pointing into the step, rad")
 
     @property
@@ -69,8 +74,12 @@ class ObstacleSection(Section):
 class ApproachSection(Section):
     """How the step is approached, and what makes one plan better than another."""
 
-    gap: NonNegative = Field(0.02, description="room between footprint and step at the end of the approach, m")
-    rank: Rank = Field("duration", description="duration, margin (of the wheel phase), or climb_rate")
+    gap: NonNegative = Field(
+        0.02, description="room between footprint and step at the end of the approach, m"
+    )
+    rank: Rank = Field(
+        "duration", description="duration, margin (of the wheel phase), or climb_rate"
+    )
 
 
 class GroundSection(Section):
@@ -80,7 +89,8 @@ class GroundSection(Section):
 
 
 class ManeuverProblem(Section):
-    """A whole manoeuvre problem. ``source`` is the file it came from; ``replace`` makes changed copies."""
+    """A whole manoeuvre problem. ``source`` is the file it came from; ``replace`` makes changed
+    copies."""
 
     title: str
     robot: ManeuverRobot = ManeuverRobot()  # type: ignore[call-arg]
@@ -96,8 +106,11 @@ class ManeuverProblem(Section):
     def _consistent(self) -> Self:
         complaint = self.free_ground.complaint(*self.start.pose)
         if complaint:
-            raise broken_rule("start.pose", list(self.start.pose), f"a start inside the space and before the step; "
-                                                                   f"here {complaint}")
+            raise broken_rule(
+                "start.pose",
+                list(self.start.pose),
+                f"a start inside the space and before the step; here {complaint}",
+            )
         if not self.limits.as_limits():
             raise broken_rule("limits", {}, "at least one limit")
         return self
@@ -115,13 +128,17 @@ class ManeuverProblem(Section):
         return FreeGround(self.space.x, self.space.y, (nx, ny), distance, self.platform.footprint)
 
     def replace(self, changes: Mapping[str, Any]) -> ManeuverProblem:
-        """Copy with changed dotted keys ({"obstacle.height": 0.035}), checked like a file. Raises ProblemError."""
+        """Copy with changed dotted keys ({"obstacle.height": 0.035}), checked like a file. Raises
+        ProblemError."""
         data = self.model_dump(mode="json", exclude_none=True)
         for key, value in changes.items():
             set_key(data, key.split("."), value, self.source)
         return validated(ManeuverProblem, data, self.source)
 
 
-def load_maneuver(path: str | FilePath, overrides: Mapping[str, Any] | None = None) -> ManeuverProblem:
-    """Manoeuvre problem from a TOML file; ``overrides`` maps dotted keys to values. Raises ProblemError."""
+def load_maneuver(
+    path: str | FilePath, overrides: Mapping[str, Any] | None = None
+) -> ManeuverProblem:
+    """Manoeuvre problem from a TOML file; ``overrides`` maps dotted keys to values. Raises
+    ProblemError."""
     return validated(ManeuverProblem, read_tables(path, overrides), str(path))

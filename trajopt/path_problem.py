@@ -1,7 +1,8 @@
 """Problem files that give the path: knots and directions instead of a search (thesis 004).
 
-The table [path] tells them from other problem files. Lengths are metres, angles radians, times seconds. The
-spline runs one unit of its parameter a segment, as the thesis's initial trajectory runs one second.
+The table [path] tells them from other problem files. Lengths are metres, angles radians, times
+seconds. The spline runs one unit of its parameter a segment, as the thesis's initial trajectory
+runs one second.
 """
 
 from __future__ import annotations
@@ -27,7 +28,15 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
-from trajopt.problem import NonNegative, Positive, Section, broken_rule, read_tables, set_key, validated
+from trajopt.problem import (
+    NonNegative,
+    Positive,
+    Section,
+    broken_rule,
+    read_tables,
+    set_key,
+    validated,
+)
 from trajopt.robots.platform import Platform
 from trajopt.robots.powerbot import LARGEST_GRADE, powerbot
 from trajopt.world.ramp import Ramp, Ramps, lay_over
@@ -66,7 +75,9 @@ class RampSection(Section):
     direction: float = Field(description="in which it rises, rad")
     length: Positive = Field(description="along the slope, m")
     height: float = Field(description="m")
-    rounding: Positive = Field(0.35, description="edges are rounded over this length, m (axle distance)")
+    rounding: Positive = Field(
+        0.35, description="edges are rounded over this length, m (axle distance)"
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
@@ -83,12 +94,16 @@ class RampSection(Section):
 class PathLimits(Section):
     """Limits of time scaling; leave a key out to leave that limit out."""
 
-    variant: Literal["physical", "thesis"] = Field("physical", description="formulas for slip and tip")
+    variant: Literal["physical", "thesis"] = Field(
+        "physical", description="formulas for slip and tip"
+    )
     speed: Positive | None = Field(None, description="of the robot, m/s")
     safety_speed: Positive | None = Field(None, description="to stop for obstacles, m/s")
     acceleration: Positive | None = Field(None, description="of the motors, m/s^2")
     deceleration: Positive | None = Field(None, description="of the motors, m/s^2, positive")
-    friction: Positive | None = Field(None, description="friction coefficient for slip and sliding out")
+    friction: Positive | None = Field(
+        None, description="friction coefficient for slip and sliding out"
+    )
     tip: bool = Field(False, description="keep all wheels on the ground")
     yaw_rate: Positive | None = Field(None, description="rad/s")
     wheel_speed: Positive | None = Field(None, description="rad/s")
@@ -98,21 +113,28 @@ class PathLimits(Section):
     @model_validator(mode="after")
     def _both(self) -> Self:
         if (self.acceleration is None) != (self.deceleration is None):
-            raise broken_rule("deceleration", self.deceleration,
-                              "acceleration and deceleration both given or both left out")
+            raise broken_rule(
+                "deceleration",
+                self.deceleration,
+                "acceleration and deceleration both given or both left out",
+            )
         return self
 
 
 class ProfileSection(Section):
     """A speed to follow along the path: linear between places, the last one the end of the path."""
 
-    places: tuple[NonNegative, ...] = Field(description="path parameter, m, increasing", min_length=2)
+    places: tuple[NonNegative, ...] = Field(
+        description="path parameter, m, increasing", min_length=2
+    )
     speeds: tuple[NonNegative, ...] = Field(description="m/s, one a place")
 
     @model_validator(mode="after")
     def _matching(self) -> Self:
         if len(self.places) != len(self.speeds):
-            raise broken_rule("speeds", list(self.speeds), f"{len(self.places)} speeds, one a place")
+            raise broken_rule(
+                "speeds", list(self.speeds), f"{len(self.places)} speeds, one a place"
+            )
         if any(b <= a for a, b in zip(self.places[:-1], self.places[1:], strict=True)):
             raise broken_rule("places", list(self.places), "increasing path parameters")
         return self
@@ -127,7 +149,8 @@ class ObstacleSection(Section):
 
 
 class PrintedSection(Section):
-    """What the thesis prints of the planned motion, and how far the knots of this file are from it."""
+    """What the thesis prints of the planned motion, and how far the knots of this file are from
+    it."""
 
     length: Positive = Field(description="m")
     time: Positive = Field(description="of the scaled motion, s")
@@ -164,14 +187,24 @@ class PathProblem(Section):
         section = self.path
         starts, goals = section.start_heading, section.goal_heading
         return Path.through(
-            section.knots, knots=np.arange(len(section.knots), dtype=np.float64),
-            start_direction=[section.start_rate * math.cos(starts), section.start_rate * math.sin(starts)],
-            end_direction=[section.goal_rate * math.cos(goals), section.goal_rate * math.sin(goals)])
+            section.knots,
+            knots=np.arange(len(section.knots), dtype=np.float64),
+            start_direction=[
+                section.start_rate * math.cos(starts),
+                section.start_rate * math.sin(starts),
+            ],
+            end_direction=[
+                section.goal_rate * math.cos(goals),
+                section.goal_rate * math.sin(goals),
+            ],
+        )
 
     @cached_property
     def spline(self) -> Path:
         """The path, over the ramps where there are some."""
-        return lay_over(self.flat_path, [r.ramp for r in self.ramps]) if self.ramps else self.flat_path
+        return (
+            lay_over(self.flat_path, [r.ramp for r in self.ramps]) if self.ramps else self.flat_path
+        )
 
     @cached_property
     def terrain(self) -> Ramps:
@@ -182,9 +215,15 @@ class PathProblem(Section):
     def largest_curvature(self) -> float:
         """Of the path in the plane, 1/m."""
         path = self.flat_path
-        return float(np.abs(sample_path(path, np.linspace(0, path.length, _CURVATURE_POINTS)).curvature).max())
+        return float(
+            np.abs(
+                sample_path(path, np.linspace(0, path.length, _CURVATURE_POINTS)).curvature
+            ).max()
+        )
 
-    def as_limits(self, *, variant: Literal["physical", "thesis"] | None = None) -> tuple[Limit, ...]:
+    def as_limits(
+        self, *, variant: Literal["physical", "thesis"] | None = None
+    ) -> tuple[Limit, ...]:
         """The limits of the file; ``variant`` overrides its choice of formulas."""
         asked, found = self.limits, list[Limit]()
         if asked.speed is not None:
@@ -215,16 +254,22 @@ class PathProblem(Section):
 
     def speed_profile(self) -> SpeedProfile | None:
         """The speed to follow, as a bound along the path."""
-        return None if self.profile is None else SpeedProfile(self.profile.places, self.profile.speeds)
+        return (
+            None if self.profile is None else SpeedProfile(self.profile.places, self.profile.speeds)
+        )
 
     def replace(self, changes: Mapping[str, Any] | None = None, /, **sections: Any) -> PathProblem:
         """Copy with changes, checked like a file.
 
-        ``changes`` maps dotted keys to values ({"limits.friction": 0.5}); keyword arguments name whole sections or
-        parts of them (limits={"friction": 0.5}). None takes a key out. Raises ProblemError.
+        ``changes`` maps dotted keys to values ({"limits.friction": 0.5}); keyword arguments name
+        whole sections or parts of them (limits={"friction": 0.5}). None takes a key out. Raises
+        ProblemError.
         """
         data = self.model_dump(mode="json", exclude_none=True)
-        for key, value in {**(changes or {}), **{k: v for k, v in sections.items() if "." in k}}.items():
+        for key, value in {
+            **(changes or {}),
+            **{k: v for k, v in sections.items() if "." in k},
+        }.items():
             set_key(data, key.split("."), value, self.source)
         for name, value in sections.items():
             if isinstance(value, Mapping) and isinstance(data.get(name), dict):
@@ -234,7 +279,9 @@ class PathProblem(Section):
         return validated(PathProblem, data, self.source)
 
 
-def load_path_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = None) -> PathProblem:
-    """Path problem from a TOML file; ``overrides`` maps dotted keys to values. Raises ProblemError in one line."""
+def load_path_problem(
+    path: str | FilePath, overrides: Mapping[str, Any] | None = None
+) -> PathProblem:
+    """Path problem from a TOML file; ``overrides`` maps dotted keys to values. Raises ProblemError
+    in one line."""
     return validated(PathProblem, read_tables(path, overrides), str(path))
-

@@ -1,7 +1,8 @@
 """Problem files: what robot, from where to where, in what scene, within what limits.
 
-A problem is a TOML file, read into frozen pydantic models that reject what they do not know. Lengths are
-metres, angles radians, times seconds; axes are right-handed (x forward, y left, yaw counter-clockwise).
+A problem is a TOML file, read into frozen pydantic models that reject what they do not know.
+Lengths are metres, angles radians, times seconds; axes are right-handed (x forward, y left, yaw
+counter-clockwise).
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ NonNegative = Annotated[float, Field(ge=0)]
 Interval = tuple[float, float]
 Wheels4 = tuple[float, float, float, float]
 
-# Final wheel angles along any path obey theta1 + theta2 = theta3 + theta4 and the heading identity: two of the
-# four are free, and for the diagonal pairs not even two (thesis 000; both are fixed by one turn).
+# Final wheel angles along any path obey theta1 + theta2 = theta3 + theta4 and the heading identity:
+# two of the four are free, and for the diagonal pairs not even two (thesis 000; both are fixed by
+# one turn).
 FREE_ANGLES = 2
 _SINGULAR_PAIRS = ({"front-left", "rear-right"}, {"front-right", "rear-left"})
 
@@ -67,8 +69,11 @@ class Goal(Section):
 
     pose: Pose = Field(description="x, y, yaw: m, m, rad")
     wheels: Wheels4 = Field(description="wanted wheel angles FL, FR, RL, RR, rad")
-    critical: tuple[WheelName, ...] = Field(description="one or two wheels whose final angle counts", min_length=1,
-                                            json_schema_extra={"maxItems": FREE_ANGLES})
+    critical: tuple[WheelName, ...] = Field(
+        description="one or two wheels whose final angle counts",
+        min_length=1,
+        json_schema_extra={"maxItems": FREE_ANGLES},
+    )
 
     @property
     def critical_indices(self) -> tuple[int, ...]:
@@ -80,11 +85,19 @@ class Goal(Section):
         if len(set(self.critical)) != len(self.critical):
             raise broken_rule("critical", list(self.critical), "each wheel once")
         if len(self.critical) > FREE_ANGLES:
-            raise broken_rule("critical", list(self.critical), "one or two wheels: pose and two of the final angles "
-                              "fix the other two (FL + FR = RL + RR, and FR - FL + RR - RL follows from the turn)")
+            raise broken_rule(
+                "critical",
+                list(self.critical),
+                "one or two wheels: pose and two of the final angles "
+                "fix the other two (FL + FR = RL + RR, and FR - FL + RR - RL follows from the turn)",
+            )
         if len(self.critical) == 2 and set(self.critical) in _SINGULAR_PAIRS:
-            raise broken_rule("critical", list(self.critical), "two wheels that are not diagonally opposite "
-                        "(diagonal wheels cannot be set independently)")
+            raise broken_rule(
+                "critical",
+                list(self.critical),
+                "two wheels that are not diagonally opposite "
+                "(diagonal wheels cannot be set independently)",
+            )
         return self
 
 
@@ -107,10 +120,15 @@ class Space(Section):
 
 
 class Spline(Section):
-    """Natural cubic spline through start, P1, P2, goal; which of its control values are searched."""
+    """Natural cubic spline through start, P1, P2, goal; which of its control values are
+    searched."""
 
-    duration: Positive = Field(description="nominal duration, s: what a search through actuators assumes")
-    free: tuple[FreeVariable, ...] = Field(("p2",), min_length=1, description="searched control values")
+    duration: Positive = Field(
+        description="nominal duration, s: what a search through actuators assumes"
+    )
+    free: tuple[FreeVariable, ...] = Field(
+        ("p2",), min_length=1, description="searched control values"
+    )
 
     @model_validator(mode="after")
     def _once(self) -> Self:
@@ -126,11 +144,18 @@ class ObjectiveSection(Section):
 
     kind: Literal["terminal", "duration"] = "terminal"
     pose_gains: tuple[NonNegative, NonNegative, NonNegative] = Field(
-        (3.0, 0.125, 2.5), description="on |dx|, |dy| (1/m), |dyaw| (1/rad): Table 5.8")
-    wheel_gain: NonNegative = Field(12.5, description="on each critical wheel's deviation, 1/rad: Table 5.8")
-    wheel_period: Literal["2pi", "pi"] = Field("2pi", description="2pi: the tables; pi: hubs half a turn apart")
+        (3.0, 0.125, 2.5), description="on |dx|, |dy| (1/m), |dyaw| (1/rad): Table 5.8"
+    )
+    wheel_gain: NonNegative = Field(
+        12.5, description="on each critical wheel's deviation, 1/rad: Table 5.8"
+    )
+    wheel_period: Literal["2pi", "pi"] = Field(
+        "2pi", description="2pi: the tables; pi: hubs half a turn apart"
+    )
     wheel_tolerance: Positive = Field(1e-3, description="rad; a solution holds within it; chosen")
-    pose_tolerance: Positive = Field(1e-3, description="m and rad; a solution holds within it; chosen")
+    pose_tolerance: Positive = Field(
+        1e-3, description="m and rad; a solution holds within it; chosen"
+    )
 
     @property
     def period(self) -> float:
@@ -148,7 +173,9 @@ class ActuatorSection(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.dead_zone >= self.saturation:
-            raise broken_rule("dead_zone", self.dead_zone, f"a speed below saturation = {self.saturation} rad/s")
+            raise broken_rule(
+                "dead_zone", self.dead_zone, f"a speed below saturation = {self.saturation} rad/s"
+            )
         return self
 
 
@@ -158,7 +185,9 @@ class Limits(Section):
     speed: Positive | None = Field(None, description="translational speed, m/s")
     yaw_rate: Positive | None = Field(None, description="rad/s")
     acceleration: Positive | None = Field(None, description="along the motion, m/s^2")
-    deceleration: Positive | None = Field(None, description="braking along the motion, m/s^2, positive")
+    deceleration: Positive | None = Field(
+        None, description="braking along the motion, m/s^2, positive"
+    )
     wheel_speed: Positive | None = Field(None, description="rad/s")
     wheel_acceleration: Positive | None = Field(None, description="rad/s^2")
     friction: Positive | None = Field(None, description="friction coefficient for the slip limit")
@@ -167,15 +196,23 @@ class Limits(Section):
     @model_validator(mode="after")
     def _both_or_none(self) -> Self:
         if (self.acceleration is None) != (self.deceleration is None):
-            raise broken_rule("deceleration", self.deceleration,
-                              "acceleration and deceleration both given or both left out")
+            raise broken_rule(
+                "deceleration",
+                self.deceleration,
+                "acceleration and deceleration both given or both left out",
+            )
         return self
 
     def as_limits(self) -> tuple[Limit, ...]:
         """The limits that are given, as time scaling takes them."""
         found: list[Limit] = []
-        for name, make in (("speed", Speed), ("yaw_rate", YawRate), ("wheel_speed", WheelSpeed),
-                           ("wheel_acceleration", WheelAcceleration), ("friction", Slip)):
+        for name, make in (
+            ("speed", Speed),
+            ("yaw_rate", YawRate),
+            ("wheel_speed", WheelSpeed),
+            ("wheel_acceleration", WheelAcceleration),
+            ("friction", Slip),
+        ):
             value = getattr(self, name)
             if value is not None:
                 found.append(make(value))
@@ -213,18 +250,33 @@ class Problem(Section):
     def _consistent(self) -> Self:
         for name, pose in (("start", self.start.pose), ("goal", self.goal.pose)):
             if not self.space.contains(pose[0], pose[1]):
-                raise broken_rule(f"{name}.pose", list(pose), f"a position inside space x {list(self.space.x)}, "
-                                                        f"y {list(self.space.y)}")
+                raise broken_rule(
+                    f"{name}.pose",
+                    list(pose),
+                    f"a position inside space x {list(self.space.x)}, y {list(self.space.y)}",
+                )
         if math.dist(self.start.pose[:2], self.goal.pose[:2]) < 1e-6:
-            raise broken_rule("goal.pose", list(self.goal.pose), "a position different from start.pose")
+            raise broken_rule(
+                "goal.pose", list(self.goal.pose), "a position different from start.pose"
+            )
         if self.objective.kind == "duration" and self.actuator.enabled:
-            raise broken_rule("actuator.enabled", True, "false with objective.kind = \"duration\": a time-scaled "
-                        "motion keeps wheel speeds within limits, so no actuator saturates")
+            raise broken_rule(
+                "actuator.enabled",
+                True,
+                'false with objective.kind = "duration": a time-scaled '
+                "motion keeps wheel speeds within limits, so no actuator saturates",
+            )
         if self.objective.kind == "duration" and "duration" in self.spline.free:
-            raise broken_rule("spline.free", list(self.spline.free), "no duration: time scaling chooses it")
+            raise broken_rule(
+                "spline.free", list(self.spline.free), "no duration: time scaling chooses it"
+            )
         if "duration" in self.spline.free and not self.actuator.enabled:
-            raise broken_rule("spline.free", list(self.spline.free), "no duration without actuator.enabled = true: "
-                              "ideal wheels end at the same angles whatever the duration")
+            raise broken_rule(
+                "spline.free",
+                list(self.spline.free),
+                "no duration without actuator.enabled = true: "
+                "ideal wheels end at the same angles whatever the duration",
+            )
         if not self.limits.as_limits():
             raise broken_rule("limits", {}, "at least one limit")
         return self
@@ -232,8 +284,8 @@ class Problem(Section):
     def replace(self, changes: Mapping[str, Any] | None = None, /, **sections: Any) -> Problem:
         """Copy with changes, checked like a file.
 
-        ``changes`` maps dotted keys to values ({"goal.wheels": [0, 0, 0, 0]}); keyword arguments name whole
-        sections or parts of them (actuator={"enabled": True}). Raises ProblemError.
+        ``changes`` maps dotted keys to values ({"goal.wheels": [0, 0, 0, 0]}); keyword arguments
+        name whole sections or parts of them (actuator={"enabled": True}). Raises ProblemError.
         """
         data = self.model_dump(mode="json", exclude_none=True)
         for key, value in (changes or {}).items():
@@ -250,14 +302,16 @@ class Problem(Section):
 
 def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
     """A broken rule of this module; carried through pydantic to become a ProblemError."""
-    return PydanticCustomError("trajopt_rule", "{expected}", {"key": key, "given": value, "expected": expected})
+    return PydanticCustomError(
+        "trajopt_rule", "{expected}", {"key": key, "given": value, "expected": expected}
+    )
 
 
 def load_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = None) -> Problem:
     """Problem from a TOML file; ``overrides`` maps dotted keys to values.
 
-    Raises ProblemError, in one line: file, key, value, and what would be right. Files with a table [path] or
-    [obstacle] are of other kinds (``problem_kind``) and have loaders of their own.
+    Raises ProblemError, in one line: file, key, value, and what would be right. Files with a table
+    [path] or [obstacle] are of other kinds (``problem_kind``) and have loaders of their own.
     """
     data = read_tables(path, overrides)
     for kind, loader in OTHER_KINDS.items():
@@ -268,12 +322,15 @@ def load_problem(path: str | FilePath, overrides: Mapping[str, Any] | None = Non
 
 
 # table that marks another kind of problem file -> the function that reads it
-OTHER_KINDS = {"path": "trajopt.load_path_problem (command line: trajopt explain)",
-               "obstacle": "trajopt.load_maneuver (command line: trajopt plan)"}
+OTHER_KINDS = {
+    "path": "trajopt.load_path_problem (command line: trajopt explain)",
+    "obstacle": "trajopt.load_maneuver (command line: trajopt plan)",
+}
 
 
 def problem_kind(path: str | FilePath) -> str:
-    """What a problem file asks for: "search" (control points), "path" (timing) or "obstacle" (a manoeuvre)."""
+    """What a problem file asks for: "search" (control points), "path" (timing) or "obstacle" (a
+    manoeuvre)."""
     tables = read_tables(path)
     return next((kind for kind in OTHER_KINDS if kind in tables), "search")
 
@@ -283,9 +340,13 @@ def read_tables(path: str | FilePath, overrides: Mapping[str, Any] | None = None
     try:
         data = tomllib.loads(FilePath(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise ProblemError(str(path), "file", "missing", "an existing problem file (*.toml)") from None
+        raise ProblemError(
+            str(path), "file", "missing", "an existing problem file (*.toml)"
+        ) from None
     except (NotADirectoryError, PermissionError, TypeError) as error:
-        raise ProblemError(str(path), "file", str(error), "a readable problem file (*.toml)") from None
+        raise ProblemError(
+            str(path), "file", str(error), "a readable problem file (*.toml)"
+        ) from None
     except IsADirectoryError:
         raise ProblemError(str(path), "file", "a directory", "a problem file (*.toml)") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -319,7 +380,9 @@ def validated(model: type[Model], data: dict[str, Any], file: str) -> Model:
         raise ProblemError(file, "source", data["source"], "no such key: it is set by the loader")
     try:
         # Through JSON, because only there does strict mode take arrays for tuples.
-        return model.model_validate_json(json.dumps({**data, "source": file}, default=_as_json), strict=True)
+        return model.model_validate_json(
+            json.dumps({**data, "source": file}, default=_as_json), strict=True
+        )
     except ValidationError as error:
         raise translated(error, file, model) from None
 
@@ -330,7 +393,9 @@ def translated(error: ValidationError, file: str, model: type[BaseModel]) -> Pro
     place = [str(part) for part in first["loc"]]
     if first["type"] == "trajopt_rule":
         context = first["ctx"]
-        return ProblemError(file, ".".join([*place, context["key"]]), context["given"], context["expected"])
+        return ProblemError(
+            file, ".".join([*place, context["key"]]), context["given"], context["expected"]
+        )
     key = _joined(first["loc"])
     if first["type"] == "extra_forbidden":
         known = _known_keys(place[:-1], model)
@@ -341,7 +406,9 @@ def translated(error: ValidationError, file: str, model: type[BaseModel]) -> Pro
     message = first["msg"].removeprefix("Input should be ").replace("a valid array", "an array")
     message = message.replace("an object", "a table")  # what JSON calls an object
     if first["type"] == "too_long":
-        message = f"at most {first['ctx']['max_length']} values, not {first['ctx']['actual_length']}"
+        message = (
+            f"at most {first['ctx']['max_length']} values, not {first['ctx']['actual_length']}"
+        )
     return ProblemError(file, key, first["input"], message[0].lower() + message[1:])
 
 

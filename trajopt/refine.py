@@ -1,10 +1,12 @@
-"""Jerk-limited motions: the time-optimal profile, smoothed in the time domain by a nonlinear program.
+"""Jerk-limited motions: the time-optimal profile, smoothed in the time domain by a nonlinear
+program.
 
-Path parameter s, speed v and acceleration a are states at N + 1 times, jerk is constant between them, the
-duration is free. The limits' rows hold at every node; rows that no motion of this kind comes near are left out of
-the program, and every row is checked afterwards. Where rows are broken between nodes the intervals are split, rows
-left out are put in, and the program is solved again from where it was. Jerk rows on an s-grid are not convex and fail
-near rest (SOURCES 004), so time is the grid here.
+Path parameter s, speed v and acceleration a are states at N + 1 times, jerk is constant between
+them, the duration is free. The limits' rows hold at every node; rows that no motion of this kind
+comes near are left out of the program, and every row is checked afterwards. Where rows are broken
+between nodes the intervals are split, rows left out are put in, and the program is solved again
+from where it was. Jerk rows on an s-grid are not convex and fail near rest (SOURCES 004), so time
+is the grid here.
 """
 
 from __future__ import annotations
@@ -30,13 +32,16 @@ _SPEED_CAP = 4.0  # times the warm start's top speed; stands for "no bound" in t
 _FINE = 10  # checked points a node interval
 _WANTED_SLOWDOWN = 1.01  # of time; chosen: beyond it intervals are split
 _MOST_SLOWDOWN = 1.05  # of time; chosen: beyond it the result is refused
-# Tables as the rows are, then the strictest rows around a place, and programs solved with each at most; chosen: the
-# first are closer where rows are smooth, the second hold where they jump (edges of ramps).
+# Tables as the rows are, then the strictest rows around a place, and programs solved with each at
+# most; chosen: the first are closer where rows are smooth, the second hold where they jump (edges
+# of ramps).
 _ATTEMPTS = ((False, 2), (True, 3))
 _PARTS = 3  # an interval is split into; chosen
 _SPLIT_ABOVE = 1e-3  # relative violation that splits an interval, or puts a row in; chosen
 _NEAR = 0.4  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
-_TIGHTER = 1e-3  # share by which rows are tightened at the nodes, for what happens between them; chosen
+_TIGHTER = (
+    1e-3  # share by which rows are tightened at the nodes, for what happens between them; chosen
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +49,8 @@ class SmoothMotion:
     """A motion with bounded jerk along the path of ``source``.
 
     Arrays at N + 1 ``times`` (s): ``s`` (m), ``v`` (m/s), ``a`` (m/s^2); ``jerk`` (N,), m/s^3,
-    constant in between. ``slowdown`` >= 1 is the factor on time that removed what was broken between nodes.
+    constant in between. ``slowdown`` >= 1 is the factor on time that removed what was broken
+    between nodes.
     """
 
     source: Trajectory
@@ -73,34 +79,50 @@ class SmoothMotion:
         return s, v, a, j
 
     def margins(self) -> dict[str, float]:
-        """Least relative margin of every limit, and of the jerk's own bound, at ten points a node interval."""
+        """Least relative margin of every limit, and of the jerk's own bound, at ten points a node
+        interval."""
         s, v, a, _ = self.along(_between(self.times))
         rows = _rows(self.source, self.source.limits, np.clip(s, 0.0, self.source.path.length))
         return _margins(rows, v, a)
 
 
-def limit_jerk(trajectory: Trajectory, jerk: float, *, nodes: int = 150, limits: tuple[Limit, ...] | None = None,
-               tolerance: float = 1e-7) -> SmoothMotion:
-    """The fastest motion found from rest to rest along the path of ``trajectory`` with |s'''| <= ``jerk``.
+def limit_jerk(
+    trajectory: Trajectory,
+    jerk: float,
+    *,
+    nodes: int = 150,
+    limits: tuple[Limit, ...] | None = None,
+    tolerance: float = 1e-7,
+) -> SmoothMotion:
+    """The fastest motion found from rest to rest along the path of ``trajectory`` with |s'''| <=
+    ``jerk``.
 
-    ``limits`` replaces the trajectory's (for instance with a WheelAcceleration added). Starts from the
-    time-optimal profile stretched to the jerk. Locally optimal; everything is checked again between the nodes
-    and slowed uniformly by what is left. Raises ArgumentError for bad arguments (a trajectory that does not
-    start and end at rest among them), InfeasibleError when IPOPT finds no motion or the slow-down is too large.
+    ``limits`` replaces the trajectory's (for instance with a WheelAcceleration added). Starts from
+    the time-optimal profile stretched to the jerk. Locally optimal; everything is checked again
+    between the nodes and slowed uniformly by what is left. Raises ArgumentError for bad arguments
+    (a trajectory that does not start and end at rest among them), InfeasibleError when IPOPT finds
+    no motion or the slow-down is too large.
     """
     if not (np.isfinite(jerk) and jerk > 0):
         raise ArgumentError("jerk", jerk, "a finite value > 0 m/s^3")
     if nodes < 10:
         raise ArgumentError("nodes", nodes, "10 or more nodes")
     if trajectory.sd[0] > 1e-9 or trajectory.sd[-1] > 1e-9:
-        raise ArgumentError("trajectory", (float(trajectory.sd[0]), float(trajectory.sd[-1])),
-                            "a motion from rest to rest")
+        raise ArgumentError(
+            "trajectory",
+            (float(trajectory.sd[0]), float(trajectory.sd[-1])),
+            "a motion from rest to rest",
+        )
     used = trajectory.limits if limits is None else limits
     source = replace(trajectory, limits=used)
     best: SmoothMotion | None = None
     failure: InfeasibleError | None = None
     for strict, rounds in _ATTEMPTS:
-        shares, put_in, guess = np.full(nodes, 1 / nodes), _near(source), _first_guess(trajectory, jerk, nodes)
+        shares, put_in, guess = (
+            np.full(nodes, 1 / nodes),
+            _near(source),
+            _first_guess(trajectory, jerk, nodes),
+        )
         for _ in range(rounds):
             if best is not None and best.slowdown <= _WANTED_SLOWDOWN:
                 return best
@@ -119,8 +141,12 @@ def limit_jerk(trajectory: Trajectory, jerk: float, *, nodes: int = 150, limits:
     if best.slowdown <= _MOST_SLOWDOWN:
         return best
     name, margin = min(best.margins().items(), key=lambda item: item[1])
-    raise InfeasibleError(name, 0.0, f"it is broken between {len(best.jerk)} nodes and would cost a factor of "
-                                     f"{best.slowdown:.3g} on time (least margin {margin:.2g}); take more nodes")
+    raise InfeasibleError(
+        name,
+        0.0,
+        f"it is broken between {len(best.jerk)} nodes and would cost a factor of "
+        f"{best.slowdown:.3g} on time (least margin {margin:.2g}); take more nodes",
+    )
 
 
 def _near(source: Trajectory) -> NDArray[np.bool_]:
@@ -133,11 +159,14 @@ def _near(source: Trajectory) -> NDArray[np.bool_]:
 
 
 def _finer(motion: SmoothMotion, excess: Array) -> tuple[Array, Array]:
-    """Shares (M,) of the duration with broken intervals (and their neighbours) split, and a start there."""
+    """Shares (M,) of the duration with broken intervals (and their neighbours) split, and a start
+    there."""
     broken = excess > _SPLIT_ABOVE
     broken = broken | np.append(broken[1:], False) | np.append(False, broken[:-1])
     steps = np.diff(motion.times)
-    shares = np.concatenate([np.full(_PARTS, h / _PARTS) if b else [h] for h, b in zip(steps, broken, strict=True)])
+    shares = np.concatenate(
+        [np.full(_PARTS, h / _PARTS) if b else [h] for h, b in zip(steps, broken, strict=True)]
+    )
     times = np.concatenate([[0.0], np.cumsum(shares)])
     s, v, a, _ = motion.along(np.minimum(times, motion.duration))
     jerk = np.repeat(motion.jerk, np.where(broken, _PARTS, 1))
@@ -145,9 +174,17 @@ def _finer(motion: SmoothMotion, excess: Array) -> tuple[Array, Array]:
 
 
 @numpy_on_symbols(False)
-def _solve(source: Trajectory, jerk: float, shares: Array, put_in: NDArray[np.bool_], start: Array,
-           tolerance: float, strict: bool) -> SmoothMotion:
-    """The program's motion on intervals that are ``shares`` (N,) of the duration, with the rows ``put_in`` (R,)."""
+def _solve(
+    source: Trajectory,
+    jerk: float,
+    shares: Array,
+    put_in: NDArray[np.bool_],
+    start: Array,
+    tolerance: float,
+    strict: bool,
+) -> SmoothMotion:
+    """The program's motion on intervals that are ``shares`` (N,) of the duration, with the rows
+    ``put_in`` (R,)."""
     length, top = source.path.length, float(source.sd.max())
     grid = np.linspace(0.0, length, TABLE_POINTS)
     rows = _rows(source, source.limits, grid)
@@ -155,58 +192,98 @@ def _solve(source: Trajectory, jerk: float, shares: Array, put_in: NDArray[np.bo
     width, n = int(put_in.sum()), len(shares)
     values = np.column_stack([rows.a[:, put_in], rows.b[:, put_in], rows.c[:, put_in], use])
     if strict:
-        values = _without_ringing(np.column_stack([values[:, :width], _strictest(values[:, width:2 * width]),
-                                                   -_strictest(-values[:, 2 * width:3 * width]),
-                                                   _strictest(use[:, None])]))
+        values = _without_ringing(
+            np.column_stack(
+                [
+                    values[:, :width],
+                    _strictest(values[:, width : 2 * width]),
+                    -_strictest(-values[:, 2 * width : 3 * width]),
+                    _strictest(use[:, None]),
+                ]
+            )
+        )
     table = smooth_table(grid, values)
     x = variables(3 * (n + 1) + n + 1)
-    s, v, a = (x[k * (n + 1):(k + 1) * (n + 1)] for k in range(3))
-    j, total = x[3 * (n + 1):4 * n + 3], x[-1]
+    s, v, a = (x[k * (n + 1) : (k + 1) * (n + 1)] for k in range(3))
+    j, total = x[3 * (n + 1) : 4 * n + 3], x[-1]
     h = total * shares
-    dynamics = stacked([
-        s[1:] - (s[:-1] + h * (v[:-1] + h * (a[:-1] / 2 + j * h / 6))),
-        v[1:] - (v[:-1] + h * (a[:-1] + j * h / 2)),
-        a[1:] - (a[:-1] + j * h)])
+    dynamics = stacked(
+        [
+            s[1:] - (s[:-1] + h * (v[:-1] + h * (a[:-1] / 2 + j * h / 6))),
+            v[1:] - (v[:-1] + h * (a[:-1] + j * h / 2)),
+            a[1:] - (a[:-1] + j * h),
+        ]
+    )
     at = table(s.T)
     square, rate = (v * v).T, a.T
     used: list[Any] = [(at[3 * width, :] * square).T]
-    used += [(at[k, :] * rate + at[width + k, :] * square - (1 - _TIGHTER) * at[2 * width + k, :]).T
-             for k in range(width)]
+    used += [
+        (at[k, :] * rate + at[width + k, :] * square - (1 - _TIGHTER) * at[2 * width + k, :]).T
+        for k in range(width)
+    ]
     constraints = stacked([dynamics, *used])
     equal, above = np.zeros(3 * n), np.full((n + 1) * (width + 1), -np.inf)
     below = np.concatenate([np.full(n + 1, 1.0 - _TIGHTER), np.zeros((n + 1) * width)])
-    lower = np.concatenate([np.zeros(2 * (n + 1)), np.full(n + 1, -np.inf), np.full(n, -jerk), [0.1 * start[-1]]])
-    upper = np.concatenate([np.full(n + 1, length), np.full(2 * (n + 1), np.inf), np.full(n, jerk),
-                            [10 * start[-1]]])
-    for k, value in ((0, 0.0), (n, length), (n + 1, 0.0), (2 * n + 1, 0.0), (2 * n + 2, 0.0), (3 * n + 2, 0.0)):
+    lower = np.concatenate(
+        [np.zeros(2 * (n + 1)), np.full(n + 1, -np.inf), np.full(n, -jerk), [0.1 * start[-1]]]
+    )
+    upper = np.concatenate(
+        [np.full(n + 1, length), np.full(2 * (n + 1), np.inf), np.full(n, jerk), [10 * start[-1]]]
+    )
+    for k, value in (
+        (0, 0.0),
+        (n, length),
+        (n + 1, 0.0),
+        (2 * n + 1, 0.0),
+        (2 * n + 2, 0.0),
+        (3 * n + 2, 0.0),
+    ):
         lower[k] = upper[k] = value
-    result = solve_program(x, total, constraints, start=start, lower=lower, upper=upper,
-                           constraint_lower=np.concatenate([equal, above]),
-                           constraint_upper=np.concatenate([equal, below]), tolerance=tolerance)
+    result = solve_program(
+        x,
+        total,
+        constraints,
+        start=start,
+        lower=lower,
+        upper=upper,
+        constraint_lower=np.concatenate([equal, above]),
+        constraint_upper=np.concatenate([equal, below]),
+        tolerance=tolerance,
+    )
     if not result.solved:
-        raise InfeasibleError("jerk", 0.0, f"IPOPT found no motion with at most {jerk:g} m/s^3 "
-                                           f"({result.status}); take more nodes or a larger jerk")
+        raise InfeasibleError(
+            "jerk",
+            0.0,
+            f"IPOPT found no motion with at most {jerk:g} m/s^3 "
+            f"({result.status}); take more nodes or a larger jerk",
+        )
     parts = np.split(result.x, [n + 1, 2 * n + 2, 3 * n + 3, 4 * n + 3])
     times = np.concatenate([[0.0], np.cumsum(shares)]) * float(parts[4][0])
-    return SmoothMotion(source, times, parts[0], parts[1], parts[2], parts[3], 1.0, result.iterations)
+    return SmoothMotion(
+        source, times, parts[0], parts[1], parts[2], parts[3], 1.0, result.iterations
+    )
 
 
 def _strictest(values: Array) -> Array:
-    """(M, K): the largest values within _REACH cells. Coefficients of s'' need none of it: they do not jump on a
-    path of class C2."""
+    """(M, K): the largest values within _REACH cells. Coefficients of s'' need none of it: they do
+    not jump on a path of class C2."""
     padded = np.pad(values, ((_REACH, _REACH), (0, 0)), mode="edge")
-    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * _REACH + 1, axis=0).max(axis=-1))
+    return np.asarray(
+        np.lib.stride_tricks.sliding_window_view(padded, 2 * _REACH + 1, axis=0).max(axis=-1)
+    )
 
 
 def _without_ringing(values: Array) -> Array:
-    """(M, K): what the cubic B-spline with coefficients ``values`` is on the grid, so that interpolation gives that
-    spline: a mean of the values within _REACH cells, while one through the values would ring at jumps and peaks."""
+    """(M, K): what the cubic B-spline with coefficients ``values`` is on the grid, so that
+    interpolation gives that spline: a mean of the values within _REACH cells, while one through the
+    values would ring at jumps and peaks."""
     around = np.pad(values, ((1, 1), (0, 0)), mode="edge")
     return np.asarray((around[:-2] + 4 * around[1:-1] + around[2:]) / 6)
 
 
 def _first_guess(trajectory: Trajectory, jerk: float, n: int) -> Array:
-    """The time-optimal motion, run slower by what its largest accelerations need to build up at ``jerk``."""
+    """The time-optimal motion, run slower by what its largest accelerations need to build up at
+    ``jerk``."""
     peak = float(np.abs(trajectory.sdd).max())
     stretch = 1.0 + peak / jerk / trajectory.duration
     t = np.linspace(0.0, trajectory.duration, n + 1)
@@ -214,7 +291,9 @@ def _first_guess(trajectory: Trajectory, jerk: float, n: int) -> Array:
     v, a = v / stretch, a / stretch**2
     a[[0, -1]] = v[[0, -1]] = 0.0
     h = trajectory.duration * stretch / n
-    return np.concatenate([s, v, a, np.clip(np.diff(a) / h, -jerk, jerk), [trajectory.duration * stretch]])
+    return np.concatenate(
+        [s, v, a, np.clip(np.diff(a) / h, -jerk, jerk), [trajectory.duration * stretch]]
+    )
 
 
 def _rows(trajectory: Trajectory, limits: tuple[Limit, ...], s: Array) -> Stages:
@@ -232,8 +311,8 @@ def _margins(rows: Stages, v: Array, a: Array) -> dict[str, float]:
 
 
 def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, NDArray[np.bool_]]:
-    """Slowed uniformly until every row holds on the fine grid (rest is feasible, so a factor exists); how far each
-    interval (N,) was broken before; which rows (R,) were."""
+    """Slowed uniformly until every row holds on the fine grid (rest is feasible, so a factor
+    exists); how far each interval (N,) was broken before; which rows (R,) were."""
     s, v, a, _ = motion.along(_between(motion.times))
     rows = _rows(motion.source, motion.source.limits, np.clip(s, 0.0, motion.source.path.length))
     used = rows.a * a[:, None] + rows.b * (v**2)[:, None]
@@ -243,8 +322,16 @@ def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, NDArray[np.bool_
     worst = np.maximum(needed.max(axis=1, initial=1.0), speed)
     factor = float(np.sqrt(worst.max()))
     excess = worst[:-1].reshape(len(motion.jerk), _FINE).max(axis=1) - 1
-    slowed = SmoothMotion(motion.source, motion.times * factor, motion.s, motion.v / factor, motion.a / factor**2,
-                          motion.jerk / factor**3, factor, motion.iterations)
+    slowed = SmoothMotion(
+        motion.source,
+        motion.times * factor,
+        motion.s,
+        motion.v / factor,
+        motion.a / factor**2,
+        motion.jerk / factor**3,
+        factor,
+        motion.iterations,
+    )
     return slowed, excess, np.asarray((needed > 1 + _SPLIT_ABOVE).any(axis=0))
 
 

@@ -1,11 +1,11 @@
 """Path and timing together: control points move inside a corridor while the speed profile adapts.
 
-Two stages (a path, then its time-optimal profile) leave time on the table where a wider bend would be faster.
-Here both are variables of one nonlinear program, solved in steps: the rows of all limits and the lengths of the
-grid's intervals are linearised in the control variables z (central differences of the same NumPy code that
-time scaling uses, so any limit works), which leaves rows (a + A z) u + (b + B z) x <= c + C z in s'' = u and
-s'^2 = x, bilinear, for IPOPT. A step counts only if time scaling along the new path is really faster;
-otherwise the trust region shrinks.
+Two stages (a path, then its time-optimal profile) leave time on the table where a wider bend would
+be faster. Here both are variables of one nonlinear program, solved in steps: the rows of all limits
+and the lengths of the grid's intervals are linearised in the control variables z (central
+differences of the same NumPy code that time scaling uses, so any limit works), which leaves rows (a
++ A z) u + (b + B z) x <= c + C z in s'' = u and s'^2 = x, bilinear, for IPOPT. A step counts only
+if time scaling along the new path is really faster; otherwise the trust region shrinks.
 """
 
 from __future__ import annotations
@@ -19,7 +19,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.limits.limit import Limit
-from trajopt.optimize.ipopt import matrix, numpy_on_symbols, solve_program, stacked, total, variables
+from trajopt.optimize.ipopt import (
+    matrix,
+    numpy_on_symbols,
+    solve_program,
+    stacked,
+    total,
+    variables,
+)
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
 from trajopt.robots.platform import Platform
@@ -31,7 +38,9 @@ from trajopt.world.terrain import Terrain
 Array = NDArray[np.float64]
 Builder = Callable[[Array], Path]
 
-GRID_CELLS = 120  # intervals of the program; chosen, as time scaling checks the result on its own grid
+GRID_CELLS = (
+    120  # intervals of the program; chosen, as time scaling checks the result on its own grid
+)
 _STEP = 1e-4  # m; central differences of the rows with respect to control variables
 _SHRINK, _GROW = 0.35, 1.5  # of the trust region after a refused and an accepted step; chosen
 _LEAST_TRUST = 1e-3  # share of the first trust region at which the search ends
@@ -40,8 +49,8 @@ _LEAST_GAIN = 1e-5  # relative gain in time at which it ends
 
 @dataclass(frozen=True, eq=False)
 class JointResult:
-    """``variables`` (d,), m; the timed motion along the new path; the two-stage duration (s) it started from;
-    the durations (s) of the accepted steps."""
+    """``variables`` (d,), m; the timed motion along the new path; the two-stage duration (s) it
+    started from; the durations (s) of the accepted steps."""
 
     variables: Array
     trajectory: Trajectory
@@ -55,7 +64,8 @@ class JointResult:
 
 
 def corridor(path: Path) -> Builder:
-    """Paths whose inner knots are moved sideways by z (K - 2,), m, left positive; ends stay as they are.
+    """Paths whose inner knots are moved sideways by z (K - 2,), m, left positive; ends stay as they
+    are.
 
     Raises ArgumentError for a path with a heading of its own or without inner knots.
     """
@@ -73,15 +83,23 @@ def corridor(path: Path) -> Builder:
     return build
 
 
-def optimize_path(build: Builder, bounds: ArrayLike, limits: Callable[[Path], Sequence[Limit]] | Sequence[Limit], *,
-                  robot: Platform | None = None, terrain: Terrain | None = None, trust: float = 0.3,
-                  steps: int = 12) -> JointResult:
-    """Least time over control variables z (d,) in ``bounds`` (d, 2), m, and the speed profile, from z = 0.
+def optimize_path(
+    build: Builder,
+    bounds: ArrayLike,
+    limits: Callable[[Path], Sequence[Limit]] | Sequence[Limit],
+    *,
+    robot: Platform | None = None,
+    terrain: Terrain | None = None,
+    trust: float = 0.3,
+    steps: int = 12,
+) -> JointResult:
+    """Least time over control variables z (d,) in ``bounds`` (d, 2), m, and the speed profile, from
+    z = 0.
 
-    ``build`` makes the path (``corridor``, or any function of z); ``limits`` are fixed, or a function of the
-    path where they depend on it. ``trust`` (m) is the first trust region, ``steps`` the most programs solved.
-    Locally optimal; never slower than two stages. Raises ArgumentError for bounds that exclude 0, and
-    InfeasibleError when the path at z = 0 cannot be timed.
+    ``build`` makes the path (``corridor``, or any function of z); ``limits`` are fixed, or a
+    function of the path where they depend on it. ``trust`` (m) is the first trust region, ``steps``
+    the most programs solved. Locally optimal; never slower than two stages. Raises ArgumentError
+    for bounds that exclude 0, and InfeasibleError when the path at z = 0 cannot be timed.
     """
     box = np.asarray(bounds, dtype=np.float64)
     if box.ndim != 2 or box.shape[1] != 2 or np.any(box[:, 0] > 0) or np.any(box[:, 1] < 0):
@@ -115,7 +133,8 @@ def optimize_path(build: Builder, bounds: ArrayLike, limits: Callable[[Path], Se
 
 @dataclass(frozen=True, eq=False)
 class _Linearised:
-    """Values and derivatives along z (last axis) of the rows at the ends of the intervals, and their lengths."""
+    """Values and derivatives along z (last axis) of the rows at the ends of the intervals, and
+    their lengths."""
 
     lengths: tuple[Array, Array]
     a: tuple[Array, Array]
@@ -125,8 +144,15 @@ class _Linearised:
 
 
 @numpy_on_symbols(False)
-def _step(build: Builder, used: Callable[[Path], Sequence[Limit]], robot: Platform | None, now: Trajectory,
-          z: Array, box: Array, radius: float) -> Array:
+def _step(
+    build: Builder,
+    used: Callable[[Path], Sequence[Limit]],
+    robot: Platform | None,
+    now: Trajectory,
+    z: Array,
+    box: Array,
+    radius: float,
+) -> Array:
     """The control variables that the linearised program likes best within ``radius`` of z."""
     path = now.path
     places = np.linspace(0.0, path.length, GRID_CELLS + 1)
@@ -150,7 +176,9 @@ def _step(build: Builder, used: Callable[[Path], Sequence[Limit]], robot: Platfo
     for k in range(table.a[0].shape[1]):
         for end, square in ((0, x[:-1]), (1, x[1:])):
             pick = slice(end, n + end)
-            a, b, c = (at((part[0][:, k], part[1][:, k]), pick) for part in (table.a, table.b, table.c))
+            a, b, c = (
+                at((part[0][:, k], part[1][:, k]), pick) for part in (table.a, table.b, table.c)
+            )
             rows.append(a * rate + b * square - c)
     rows.append(at(table.cap, slice(None)) * x - 1)
     constraints = stacked(rows)
@@ -159,15 +187,30 @@ def _step(build: Builder, used: Callable[[Path], Sequence[Limit]], robot: Platfo
     upper = np.concatenate([np.full(n + 1, np.inf), np.minimum(box[:, 1] - z, radius)])
     for k in (0, n):
         lower[k] = upper[k] = x_now[k]
-    result = solve_program(symbols, cost, constraints, start=np.concatenate([0.98 * x_now, np.zeros(d)]),
-                           lower=lower, upper=upper, constraint_lower=np.full(count, -np.inf),
-                           constraint_upper=np.zeros(count), tolerance=1e-6, max_iterations=120)
+    result = solve_program(
+        symbols,
+        cost,
+        constraints,
+        start=np.concatenate([0.98 * x_now, np.zeros(d)]),
+        lower=lower,
+        upper=upper,
+        constraint_lower=np.full(count, -np.inf),
+        constraint_upper=np.zeros(count),
+        tolerance=1e-6,
+        max_iterations=120,
+    )
     return np.asarray(np.clip(z + result.x[n + 1 :], box[:, 0], box[:, 1]))
 
 
-def _linearised(build: Builder, used: Callable[[Path], Sequence[Limit]], robot: Platform | None, z: Array,
-                u: Array) -> _Linearised:
+def _linearised(
+    build: Builder,
+    used: Callable[[Path], Sequence[Limit]],
+    robot: Platform | None,
+    z: Array,
+    u: Array,
+) -> _Linearised:
     """Central differences of everything that depends on z."""
+
     def values(at: Array) -> tuple[Array, Array, Array, Array, Array]:
         path = build(at)
         s = path.parameter(u)
@@ -179,8 +222,9 @@ def _linearised(build: Builder, used: Callable[[Path], Sequence[Limit]], robot: 
     for k in range(len(z)):
         step = np.zeros(len(z))
         step[k] = _STEP
-        for part, (high, low) in zip(slopes, zip(values(z + step), values(z - step), strict=True), strict=True):
+        for part, (high, low) in zip(
+            slopes, zip(values(z + step), values(z - step), strict=True), strict=True
+        ):
             part.append((high - low) / (2 * _STEP))
     pairs = [(value, np.stack(part, axis=-1)) for value, part in zip(middle, slopes, strict=True)]
     return _Linearised(*pairs)
-

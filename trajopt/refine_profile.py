@@ -1,8 +1,8 @@
 """Following a given speed profile as closely as the limits allow (thesis 004, section 2.4).
 
-From below, the profile is one more bound and the fastest motion under it is the closest at every place: no
-feasible profile that stays below is faster anywhere. In the least-squares sense the motion may also run above
-the profile where that pays for being below elsewhere.
+From below, the profile is one more bound and the fastest motion under it is the closest at every
+place: no feasible profile that stays below is faster anywhere. In the least-squares sense the
+motion may also run above the profile where that pays for being below elsewhere.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ _MOST_SLOWDOWN = 1.01  # of time; chosen
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """The motion, and how far its speed is from the profile's over the path: root mean square and largest, m/s."""
+    """The motion, and how far its speed is from the profile's over the path: root mean square and
+    largest, m/s."""
 
     trajectory: Trajectory
     wanted: Array  # (N+1,) m/s at the trajectory's gridpoints
@@ -51,30 +52,60 @@ class Followed:
         return float(np.abs(self.trajectory.sd - self.wanted).max())
 
 
-def follow(path: Path, profile: SpeedProfile, limits: Sequence[Limit], *, robot: Platform | None = None,
-           terrain: Terrain | None = None, start_speed: float = 0.0, end_speed: float = 0.0,
-           manner: Literal["below", "least_squares"] = "below") -> Followed:
+def follow(
+    path: Path,
+    profile: SpeedProfile,
+    limits: Sequence[Limit],
+    *,
+    robot: Platform | None = None,
+    terrain: Terrain | None = None,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
+    manner: Literal["below", "least_squares"] = "below",
+) -> Followed:
     """The motion closest to ``profile`` (s' over s) within ``limits``.
 
-    "below": nowhere above the profile; exact (it is a time-optimal problem). "least_squares": least integral of
-    (s'^2 - profile^2)^2 over the path, a convex program on the same rows solved by IPOPT, then checked and slowed
-    uniformly by what is left. Raises as ``time_scale``.
+    "below": nowhere above the profile; exact (it is a time-optimal problem). "least_squares": least
+    integral of (s'^2 - profile^2)^2 over the path, a convex program on the same rows solved by
+    IPOPT, then checked and slowed uniformly by what is left. Raises as ``time_scale``.
     """
     if manner not in ("below", "least_squares"):
         raise ArgumentError("manner", manner, "below or least_squares")
     if manner == "below":
-        found = time_scale(path, [*limits, profile], robot=robot, terrain=terrain, start_speed=start_speed,
-                           end_speed=end_speed)
+        found = time_scale(
+            path,
+            [*limits, profile],
+            robot=robot,
+            terrain=terrain,
+            start_speed=start_speed,
+            end_speed=end_speed,
+        )
         return Followed(found, np.interp(found.s, profile.places, profile.speeds))
-    warm = time_scale(path, [*limits, profile], robot=robot, terrain=terrain, start_speed=start_speed,
-                      end_speed=end_speed)
-    return _least_squares(path, profile, tuple(limits), robot, Flat() if terrain is None else terrain, warm)
+    warm = time_scale(
+        path,
+        [*limits, profile],
+        robot=robot,
+        terrain=terrain,
+        start_speed=start_speed,
+        end_speed=end_speed,
+    )
+    return _least_squares(
+        path, profile, tuple(limits), robot, Flat() if terrain is None else terrain, warm
+    )
 
 
 @numpy_on_symbols(False)
-def _least_squares(path: Path, profile: SpeedProfile, limits: tuple[Limit, ...], robot: Platform | None,
-                   terrain: Terrain, warm: Trajectory) -> Followed:
-    places = np.unique(np.concatenate([np.linspace(0.0, path.length, _CELLS + 1), np.asarray(profile.places)]))
+def _least_squares(
+    path: Path,
+    profile: SpeedProfile,
+    limits: tuple[Limit, ...],
+    robot: Platform | None,
+    terrain: Terrain,
+    warm: Trajectory,
+) -> Followed:
+    places = np.unique(
+        np.concatenate([np.linspace(0.0, path.length, _CELLS + 1), np.asarray(profile.places)])
+    )
     places = places[(places >= 0) & (places <= path.length)]
     u = np.unique(np.concatenate([path.locate(places), np.asarray(path.basis.knots)]))
     u = u[np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])]
@@ -98,15 +129,37 @@ def _least_squares(path: Path, profile: SpeedProfile, limits: tuple[Limit, ...],
     lower[[0, -1]] = upper[[0, -1]] = first[[0, -1]]
     constraints = stacked(rows)
     count = constraints.shape[0]
-    result = solve_program(x, cost, constraints, start=np.clip(first, lower, upper), lower=lower, upper=upper,
-                           constraint_lower=np.full(count, -np.inf), constraint_upper=np.full(count, -_TIGHTER))
+    result = solve_program(
+        x,
+        cost,
+        constraints,
+        start=np.clip(first, lower, upper),
+        lower=lower,
+        upper=upper,
+        constraint_lower=np.full(count, -np.inf),
+        constraint_upper=np.full(count, -_TIGHTER),
+    )
     if not result.solved:
-        raise InfeasibleError("speed_profile", 0.0, f"IPOPT found no closest motion ({result.status})")
+        raise InfeasibleError(
+            "speed_profile", 0.0, f"IPOPT found no closest motion ({result.status})"
+        )
     sd2 = np.maximum(result.x, 0.0)
     factor = max(1.0, float(check(fine, sd2).factor.max()))
     if np.sqrt(factor) > _MOST_SLOWDOWN:
-        raise InfeasibleError("speed_profile", 0.0, f"between gridpoints it would have to slow by {factor**0.5:.3g}")
+        raise InfeasibleError(
+            "speed_profile", 0.0, f"between gridpoints it would have to slow by {factor**0.5:.3g}"
+        )
     sd2 = sd2 / factor
-    found = Trajectory(path, limits, robot, terrain, fine.u, fine.s, np.sqrt(sd2), np.diff(sd2) / (2 * step),
-                       "least_squares", float(np.sqrt(factor)))
+    found = Trajectory(
+        path,
+        limits,
+        robot,
+        terrain,
+        fine.u,
+        fine.s,
+        np.sqrt(sd2),
+        np.diff(sd2) / (2 * step),
+        "least_squares",
+        float(np.sqrt(factor)),
+    )
     return Followed(found, wanted)

@@ -1,4 +1,5 @@
-"""The robot on split offset casters in both engines: masses, flat ground, contact loss, bad input."""
+"""The robot on split offset casters in both engines: masses, flat ground, contact loss, bad
+input."""
 
 from __future__ import annotations
 
@@ -48,7 +49,8 @@ def test_planned_corners_keep_the_path_on_level_ground(engine) -> None:
 
 
 def test_a_step_in_the_ground_lies_where_the_map_has_it() -> None:
-    """Asymmetric maps catch swapped axes: a plateau under the robot lifts it, beside it does not."""
+    """Asymmetric maps catch swapped axes: a plateau under the robot lifts it, beside it does
+    not."""
     heights = np.zeros((40, 30))
     heights[20:, :] = 0.08  # y >= 2 m
     reference = planned_speed([[0.0, 0.0], [0.2, 0.0]])
@@ -56,16 +58,25 @@ def test_a_step_in_the_ground_lies_where_the_map_has_it() -> None:
         low = drive(GEOMETRY, HeightMap(heights, 0.25, (-3.0, -3.0)), reference)
         assert abs(low.roll_pitch).max() < 0.06
         assert abs(low.roll_pitch[-1, 0]) < 0.01
-        ramped = replace(HeightMap(np.tile(0.1 * np.arange(40)[:, None] * 0.25, (1, 30)), 0.25), origin=(-3.0, -3.0))
+        ramped = replace(
+            HeightMap(np.tile(0.1 * np.arange(40)[:, None] * 0.25, (1, 30)), 0.25),
+            origin=(-3.0, -3.0),
+        )
         tilted = drive(GEOMETRY, ramped, reference)
-        assert tilted.roll_pitch[-1, 0] == pytest.approx(np.arctan(0.1), abs=0.03)  # rises along +y: rolls
+        assert tilted.roll_pitch[-1, 0] == pytest.approx(
+            np.arctan(0.1), abs=0.03
+        )  # rises along +y: rolls
         assert abs(tilted.roll_pitch[-1, 1]) < 0.06
 
 
 @pytest.mark.parametrize("engine", list(ENGINES))
 def test_odometry_knows_the_pose_on_level_ground_at_planned_speed(engine) -> None:
-    run = ENGINES[engine](GEOMETRY, level(), planned_speed(square_corners(1.0)),
-                          knowledge=Knowledge(terrain=False, update_period=np.inf))
+    run = ENGINES[engine](
+        GEOMETRY,
+        level(),
+        planned_speed(square_corners(1.0)),
+        knowledge=Knowledge(terrain=False, update_period=np.inf),
+    )
     assert run.rms < 0.04
     assert run.pose[-1] == pytest.approx([0.0, 0.0, 0.0], abs=0.08)
 
@@ -86,7 +97,9 @@ def test_square_on_level_and_rough_ground(engine) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", list(ENGINES))
 def test_driven_pivots_run_too(engine) -> None:
-    rough = replace(rough_ground(0.015, rng=np.random.default_rng(3), size=6.0), origin=(-2.0, -2.0))
+    rough = replace(
+        rough_ground(0.015, rng=np.random.default_rng(3), size=6.0), origin=(-2.0, -2.0)
+    )
     run = ENGINES[engine](GEOMETRY, rough, planned_speed(square_corners(1.0)), driven_pivots=True)
     assert run.rms < 0.05
 
@@ -104,13 +117,18 @@ def test_bad_input_is_refused() -> None:
     with pytest.raises(ArgumentError, match="geometry"):
         AsocBody(AsocGeometry(4, wheel_radius=0.3, wheel_width=0.2))
     with pytest.raises(ArgumentError, match="ground"):
-        asoc_in_pybullet(GEOMETRY, HeightMap(np.zeros((600, 600)), 0.1), planned_speed(square_corners(1.0)))
+        asoc_in_pybullet(
+            GEOMETRY, HeightMap(np.zeros((600, 600)), 0.1), planned_speed(square_corners(1.0))
+        )
 
 
 def test_a_state_that_left_physics_is_an_error() -> None:
     from trajopt.simulate.asoc_run import AsocState
 
-    upside, none = np.diag([1.0, -1.0, -1.0]), (np.zeros(4), np.zeros((4, 2)), np.zeros((4, 2), dtype=bool))
+    upside, none = (
+        np.diag([1.0, -1.0, -1.0]),
+        (np.zeros(4), np.zeros((4, 2)), np.zeros((4, 2), dtype=bool)),
+    )
     with pytest.raises(SimulationError, match="tipped"):
         _pose(AsocState(np.zeros(3), upside, *none), 1.0)
     with pytest.raises(SimulationError, match="finite"):

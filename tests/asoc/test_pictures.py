@@ -22,7 +22,9 @@ def test_every_platform_can_be_drawn_with_its_centre(name, tmp_path) -> None:
     figure = platform_figure(platform, steering=steering_for(platform, twist), twist=twist)
     assert save_figure(figure, tmp_path / "a.png").stat().st_size > 5000
     marks = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
-    assert [float(marks[0].get_xdata()[0]), float(marks[0].get_ydata()[0])] == pytest.approx([0.0, 0.5 / 0.6])
+    assert [float(marks[0].get_xdata()[0]), float(marks[0].get_ydata()[0])] == pytest.approx(
+        [0.0, 0.5 / 0.6]
+    )
     straight = platform_figure(platform, twist=[1.0, 0.0, 0.0])
     assert any("infinity" in text.get_text() for text in straight.axes[0].texts)
 
@@ -37,7 +39,9 @@ def test_wrong_shapes_are_refused() -> None:
 def test_figures_hold_what_they_are_given() -> None:
     x = np.linspace(1, 2, 5)
     assert len(curve_figure(x, x / 2, {1.0: 0.5}, ("t", "x", "y")).axes[0].lines) == 2
-    assert map_figure(x, x, np.full((5, 5), 0.5), ("t", "x", "y"), (x, x)).axes[0].get_title() == "t"
+    assert (
+        map_figure(x, x, np.full((5, 5), 0.5), ("t", "x", "y"), (x, x)).axes[0].get_title() == "t"
+    )
     assert len(tracks_figure(np.zeros((2, 2)), [("a", np.zeros((3, 2)))], "t").axes[0].lines) == 2
     assert len(speed_figure([("a", x, x)], 1.5, "t").axes[0].lines) == 3
     assert len(front_figure(np.ones((4, 3)), ["K", "d_max", "S"], np.ones(3)).axes) == 2

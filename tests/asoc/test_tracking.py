@@ -1,4 +1,5 @@
-"""Tracking over rough ground: equations 17-20, orderings of Tables IX and X, planned corner speed."""
+"""Tracking over rough ground: equations 17-20, orderings of Tables IX and X, planned corner
+speed."""
 
 from __future__ import annotations
 
@@ -19,7 +20,12 @@ from benchmarks.asoc_tables_tracking import (
     places,
 )
 from trajopt.control.asoc_grip import SLIP_STIFFNESS, wheel_lag
-from trajopt.control.asoc_reference import constant_speed, planned_speed, require_pivots, square_corners
+from trajopt.control.asoc_reference import (
+    constant_speed,
+    planned_speed,
+    require_pivots,
+    square_corners,
+)
 from trajopt.control.asoc_tracking import (
     FRICTION,
     POSITION_GAIN,
@@ -44,8 +50,15 @@ COARSE = 0.02  # s, twice the default step: tests over many fields compare, they
 def errors(sigma: float, knowledge: Knowledge, command: Command) -> np.ndarray:
     """(FIELDS,): RMS error field by field; the fields differ in roughness alone."""
     ground, origins = places(sigma, FIELDS)
-    found = track_many(GEOMETRY, ground, command.reference, [knowledge] * FIELDS, origins, friction=command.friction,
-                       step=COARSE)
+    found = track_many(
+        GEOMETRY,
+        ground,
+        command.reference,
+        [knowledge] * FIELDS,
+        origins,
+        friction=command.friction,
+        step=COARSE,
+    )
     return np.array([r.rms for r in found])
 
 
@@ -59,8 +72,11 @@ def test_commands_and_body_twist_are_inverse_of_each_other() -> None:
     slope, twist = rng.uniform(-0.6, 0.6, (5, 4, 2)), rng.uniform(-1, 1, (5, 3))
     speeds = wheel_commands(GEOMETRY, alpha, twist, tilt, slope)
     np.testing.assert_allclose(body_twist(GEOMETRY, alpha, speeds, tilt, slope), twist, atol=1e-12)
-    links = np.einsum("mnij,mnj->mni", module_jacobian(alpha, GEOMETRY.split, GEOMETRY.offset, tilt),
-                      speeds * np.cos(slope))  # eq. 20
+    links = np.einsum(
+        "mnij,mnj->mni",
+        module_jacobian(alpha, GEOMETRY.split, GEOMETRY.offset, tilt),
+        speeds * np.cos(slope),
+    )  # eq. 20
     np.testing.assert_allclose(links, link_velocities(GEOMETRY.positions, twist), atol=1e-12)
 
 
@@ -98,9 +114,12 @@ def test_flat_ground_and_planned_corners(fast) -> None:
     assert rate.max() < 1.02 * FRICTION * 9.80665
 
 
-def test_a_sliding_corner_is_that_of_a_point_mass_with_friction_over_the_square_root_of_two(fast) -> None:
-    """Why the level error is what it is: from one side to the next the robot gets mu g/sqrt(2) (test_grip). A point
-    that accelerates as fast towards the commanded velocity, position feedback included, has nearly its error."""
+def test_a_sliding_corner_is_that_of_a_point_mass_with_friction_over_the_square_root_of_two(
+    fast,
+) -> None:
+    """Why the level error is what it is: from one side to the next the robot gets mu g/sqrt(2)
+    (test_grip). A point that accelerates as fast towards the commanded velocity, position feedback
+    included, has nearly its error."""
     reference, most = constant_speed(square_corners()), FRICTION * 9.80665 / np.sqrt(2)
     place, speed, squares, step = np.zeros(2), np.zeros(2), [], 1e-3
     for moment in np.arange(0.0, reference.duration, step):
@@ -109,18 +128,23 @@ def test_a_sliding_corner_is_that_of_a_point_mass_with_friction_over_the_square_
         change = velocity + POSITION_GAIN * (due - place) - speed
         speed = speed + change * min(1.0, most * step / max(float(np.linalg.norm(change)), 1e-12))
         place = place + step * speed
-    assert fast.rms == pytest.approx(np.sqrt(np.mean(squares)), rel=0.08)  # it starts at mu g along its heading
+    assert fast.rms == pytest.approx(
+        np.sqrt(np.mean(squares)), rel=0.08
+    )  # it starts at mu g along its heading
 
 
 def test_without_slip_a_straight_line_is_caught_up_as_the_lag_says() -> None:
-    """e'' + e'/lag + gain e/lag = 0 for the distance e to the point due; rubber adds v/(g stiffness) to the lag."""
+    """e'' + e'/lag + gain e/lag = 0 for the distance e to the point due; rubber adds v/(g
+    stiffness) to the lag."""
     reference = constant_speed([[0.0, 0.0], [4.5, 0.0]])
     found = track(GEOMETRY, level(), reference, Knowledge(), friction=np.inf, step=0.005)
     late = (found.wanted - found.pose[:, :2])[:, 0]
     lag = wheel_lag(GEOMETRY) + 1.5 / (9.80665 * SLIP_STIFFNESS)
     slow = (1 - np.sqrt(1 - 4 * lag * POSITION_GAIN)) / (2 * lag)
     first, last = 60, 360  # 0.3 and 1.8 s
-    assert np.log(late[first] / late[last]) == pytest.approx(slow * (last - first) * 0.005, rel=0.02)
+    assert np.log(late[first] / late[last]) == pytest.approx(
+        slow * (last - first) * 0.005, rel=0.02
+    )
     assert late.max() < 0.05
     assert found.rms_across < 1e-12
 
@@ -128,17 +152,26 @@ def test_without_slip_a_straight_line_is_caught_up_as_the_lag_says() -> None:
 def test_large_friction_is_no_slip() -> None:
     ground, _ = places(0.03, 1)
     reference = constant_speed(square_corners(1.0))
-    free, high, real = (track(GEOMETRY, ground, reference, Knowledge(False, 2.0), friction=friction, step=COARSE)
-                        for friction in (np.inf, 500.0, 0.6))
+    free, high, real = (
+        track(GEOMETRY, ground, reference, Knowledge(False, 2.0), friction=friction, step=COARSE)
+        for friction in (np.inf, 500.0, 0.6)
+    )
     np.testing.assert_allclose(free.pose, high.pose, atol=1e-9)
     assert np.abs(free.pose - real.pose).max() > 0.05
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("command", "sigmas"), [(FAST, (0.0, 0.015, 0.03, 0.045)), (NO_SLIP, (0.015, 0.03, 0.045)),
-                                                 (PLANNED, (0.015, 0.03, 0.045))])
+@pytest.mark.parametrize(
+    ("command", "sigmas"),
+    [
+        (FAST, (0.0, 0.015, 0.03, 0.045)),
+        (NO_SLIP, (0.015, 0.03, 0.045)),
+        (PLANNED, (0.015, 0.03, 0.045)),
+    ],
+)
 def test_error_grows_with_roughness(command, sigmas) -> None:
-    """Table IX, field by field. What bumps of 1.5 cm cost a robot that does not slide is too little to test."""
+    """Table IX, field by field. What bumps of 1.5 cm cost a robot that does not slide is too little
+    to test."""
     rms = [errors(sigma, Knowledge(), command) for sigma in sigmas]
     for smooth, rough in pairwise(rms):
         assert sure_gain(rough - smooth)
@@ -149,8 +182,8 @@ def test_error_grows_with_roughness(command, sigmas) -> None:
 def test_knowledge_lowers_the_error(command) -> None:
     """Table X's comparisons, field by field.
 
-    At constant speed and finite friction the robot slides outwards at every corner by more than terrain knowledge
-    is worth: there only the absolute position shows.
+    At constant speed and finite friction the robot slides outwards at every corner by more than
+    terrain knowledge is worth: there only the absolute position shows.
     """
     rms = {case: errors(0.03, knowledge, command) for case, knowledge in KNOWLEDGE.items()}
     for name, knowing, ignorant in PAIRS:
@@ -163,9 +196,13 @@ def test_odometry_is_right_where_wheels_hardly_creep_and_do_not_slide_and_runs_r
     blind = track(GEOMETRY, level(), planned, Knowledge(update_period=np.inf), step=COARSE)
     assert np.abs(blind.pose - blind.estimate).max() < 0.02
     sliding = track(GEOMETRY, level(), reference, Knowledge(update_period=np.inf), step=COARSE)
-    assert np.abs(sliding.pose - sliding.estimate).max() > 0.05  # corners at 1.5 m/s ask for more than friction has
+    assert (
+        np.abs(sliding.pose - sliding.estimate).max() > 0.05
+    )  # corners at 1.5 m/s ask for more than friction has
     ground, _ = places(0.03, 1)
-    first, again = (track(GEOMETRY, ground, reference, Knowledge(False, 2.0), step=COARSE) for _ in range(2))
+    first, again = (
+        track(GEOMETRY, ground, reference, Knowledge(False, 2.0), step=COARSE) for _ in range(2)
+    )
     assert np.array_equal(first.pose, again.pose)
 
 
@@ -183,22 +220,40 @@ def test_ground_steeper_than_the_pivots_is_reported_with_place_and_angle() -> No
     heights = np.zeros((60, 60))
     heights[:, 50:] = 0.4
     ground = HeightMap(heights, 0.1, (-1.0, -1.0))
-    with pytest.raises(InfeasibleError, match=r"must tilt .* deg, the pivots allow 33.9 deg") as caught:
+    with pytest.raises(
+        InfeasibleError, match=r"must tilt .* deg, the pivots allow 33.9 deg"
+    ) as caught:
         require_pivots(short, ground, reference)
     assert caught.value.limit == "pivot"
     assert 4.5 <= caught.value.place < 9.0  # on the second side the axles lie across the edge
     assert require_pivots(short, level(), reference) == 0.0
 
 
-@pytest.mark.parametrize("call", [
-    lambda: constant_speed([[0, 0]]), lambda: constant_speed([[0, 0], [0, 0]]),
-    lambda: constant_speed(square_corners(), -1.0), lambda: Knowledge(update_period=-1.0),
-    lambda: track(GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), step=0.0),
-    lambda: track(GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), step=np.inf),
-    lambda: track(GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), friction=np.nan),
-    lambda: track(GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), friction=0.0),
-    lambda: track(GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), friction=-np.inf),
-    lambda: track_many(GEOMETRY, level(), constant_speed(square_corners()), [Knowledge()], np.zeros((2, 2)))])
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: constant_speed([[0, 0]]),
+        lambda: constant_speed([[0, 0], [0, 0]]),
+        lambda: constant_speed(square_corners(), -1.0),
+        lambda: Knowledge(update_period=-1.0),
+        lambda: track(GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), step=0.0),
+        lambda: track(
+            GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), step=np.inf
+        ),
+        lambda: track(
+            GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), friction=np.nan
+        ),
+        lambda: track(
+            GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), friction=0.0
+        ),
+        lambda: track(
+            GEOMETRY, level(), constant_speed(square_corners()), Knowledge(), friction=-np.inf
+        ),
+        lambda: track_many(
+            GEOMETRY, level(), constant_speed(square_corners()), [Knowledge()], np.zeros((2, 2))
+        ),
+    ],
+)
 def test_bad_input_is_refused(call) -> None:
     with pytest.raises(ArgumentError):
         call()

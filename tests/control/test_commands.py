@@ -8,7 +8,13 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
-from trajopt.control.commands import commands, compare_log, driven, export_commands, sample_time_study
+from trajopt.control.commands import (
+    commands,
+    compare_log,
+    driven,
+    export_commands,
+    sample_time_study,
+)
 from trajopt.control.tracking import Disturbance, Tracker, track
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
@@ -21,21 +27,29 @@ from trajopt.timing.trajectory import Trajectory
 
 @pytest.fixture(scope="module")
 def plan() -> Trajectory:
-    path = Path.through([[0, 0], [2, 0.5], [4, -0.3], [6, 0.4]], start_direction=[1, 0], end_direction=[1, 0])
+    path = Path.through(
+        [[0, 0], [2, 0.5], [4, -0.3], [6, 0.4]], start_direction=[1, 0], end_direction=[1, 0]
+    )
     return time_scale(path, [Speed(0.8), Acceleration(0.5, 1.0)], robot=powerbot())
 
 
 def test_mean_commands_end_at_the_planned_wheel_angles(plan: Trajectory) -> None:
     for sample_time in (0.07, 0.5):
         orders = commands(plan, sample_time)
-        turned = np.array([orders.left.sum(), orders.right.sum()]) * sample_time / powerbot().wheels[0].radius
+        turned = (
+            np.array([orders.left.sum(), orders.right.sum()])
+            * sample_time
+            / powerbot().wheels[0].radius
+        )
         assert turned == pytest.approx(plan.at(plan.duration).wheel_angles[0], rel=1e-9)
 
 
 def test_drive_of_a_circle_is_exact(plan: Trajectory) -> None:
     """Constant wheel speeds make a circle, whatever the sampling."""
     orders = commands(plan, 0.5)
-    circle = type(orders)(orders.times, np.full(len(orders.times), 0.3), np.full(len(orders.times), 0.5), 0.5)
+    circle = type(orders)(
+        orders.times, np.full(len(orders.times), 0.3), np.full(len(orders.times), 0.5), 0.5
+    )
     t = np.linspace(0, circle.duration, 33)
     pose = driven(circle, powerbot(), (1.0, 2.0, 0.3), t)
     w, v = 0.2 / (2 * 0.268), 0.4
@@ -70,8 +84,15 @@ def test_export_and_compare(plan: Trajectory, tmp_path: FilePath) -> None:
     assert found.time_offset == pytest.approx(t[-1] - plan.duration)
 
 
-@pytest.mark.parametrize("text", ["t,x\n0,1\n", "t,x,y,yaw,v\n0,0,0,0,0\n", "t,x,y,yaw,v\n0,0,0,0,a\n1,0,0,0,0\n",
-                                  "t,x,y,yaw,v\n1,0,0,0,0\n0,0,0,0,0\n"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t,x\n0,1\n",
+        "t,x,y,yaw,v\n0,0,0,0,0\n",
+        "t,x,y,yaw,v\n0,0,0,0,a\n1,0,0,0,0\n",
+        "t,x,y,yaw,v\n1,0,0,0,0\n0,0,0,0,0\n",
+    ],
+)
 def test_bad_logs_are_refused(plan: Trajectory, tmp_path: FilePath, text: str) -> None:
     log = tmp_path / "log.csv"
     log.write_text(text, encoding="utf-8")
@@ -81,15 +102,33 @@ def test_bad_logs_are_refused(plan: Trajectory, tmp_path: FilePath, text: str) -
 
 def test_tracker_corrects_start_errors_and_drift(plan: Trajectory) -> None:
     disturbance = Disturbance((-0.1, 0.1, 0.1), left=0.01, right=-0.01, noise=0.05)
-    runs = [track(plan, tracker, powerbot(), sample_time=0.05, disturbance=disturbance,
-                  rng=np.random.default_rng(3)) for tracker in (None, Tracker())]
+    runs = [
+        track(
+            plan,
+            tracker,
+            powerbot(),
+            sample_time=0.05,
+            disturbance=disturbance,
+            rng=np.random.default_rng(3),
+        )
+        for tracker in (None, Tracker())
+    ]
     open_loop, closed = (run.errors[-1] for run in runs)
     assert closed[0] < 0.02 < open_loop[0]
     assert np.degrees(closed[1]) < 1.0
 
 
 def test_tracker_without_errors_changes_nothing(plan: Trajectory) -> None:
-    runs = [track(plan, tracker, powerbot(), sample_time=0.02, disturbance=Disturbance(),
-                  rng=np.random.default_rng(0)) for tracker in (None, Tracker())]
+    runs = [
+        track(
+            plan,
+            tracker,
+            powerbot(),
+            sample_time=0.02,
+            disturbance=Disturbance(),
+            rng=np.random.default_rng(0),
+        )
+        for tracker in (None, Tracker())
+    ]
     assert runs[0].errors[:, 0].max() < 2e-3
     assert runs[1].errors[:, 0].max() < 2e-3

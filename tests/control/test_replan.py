@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from trajopt.control.encounter import Course, Obstacle, Visitor, clearance, course, safe_speed, visited_world
+from trajopt.control.encounter import (
+    Course,
+    Obstacle,
+    Visitor,
+    clearance,
+    course,
+    safe_speed,
+    visited_world,
+)
 from trajopt.control.replan import (
     TIME_STEP,
     Sensor,
@@ -31,12 +39,14 @@ SPAN = 12.0  # s after which the way is free in every encounter
 def bend() -> Course:
     path = Path.through([[0, 0], [2, 0.5], [4, -0.3]], start_direction=[1, 0], end_direction=[1, 0])
     robot = powerbot()
-    return course(time_scale(path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.332)], robot=robot), robot)
+    return course(
+        time_scale(path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.332)], robot=robot), robot
+    )
 
 
 class Crowd:
-    """Discs that enter at or beyond the sensor's range of where the robot then stands, wander with bounded
-    speed, and are gone after SPAN."""
+    """Discs that enter at or beyond the sensor's range of where the robot then stands, wander with
+    bounded speed, and are gone after SPAN."""
 
     def __init__(self, where: Course, sensor: Sensor, rng: np.random.Generator) -> None:
         self.where, self.sensor, self.rng = where, sensor, rng
@@ -59,12 +69,18 @@ class Crowd:
                 self.centre[i] = self.enter_at(pose, self.radius[i])
             else:
                 self.centre[i] += self.move(i, pose, step)
-            things.append(Obstacle(tuple(self.centre[i]), self.radius[i], (0.0, 0.0), self.sensor.unseen_speed))
+            things.append(
+                Obstacle(
+                    tuple(self.centre[i]), self.radius[i], (0.0, 0.0), self.sensor.unseen_speed
+                )
+            )
         return things
 
     def enter_at(self, pose: np.ndarray, radius: float) -> np.ndarray:
         """Just outside the range: ahead on the path most of the time, else anywhere around."""
-        angle = pose[2] + (self.rng.normal(0, 0.3) if self.rng.random() < 0.7 else self.rng.uniform(-np.pi, np.pi))
+        angle = pose[2] + (
+            self.rng.normal(0, 0.3) if self.rng.random() < 0.7 else self.rng.uniform(-np.pi, np.pi)
+        )
         far = 0.0
         direction = np.array([np.cos(angle), np.sin(angle)])
         while True:
@@ -77,19 +93,37 @@ class Crowd:
     def move(self, i: int, pose: np.ndarray, step: float) -> np.ndarray:
         """Towards the robot half of the time, else anywhere; never through its outline."""
         to_robot = pose[:2] - self.centre[i]
-        angle = np.arctan2(to_robot[1], to_robot[0]) if self.rng.random() < 0.5 else self.rng.uniform(-np.pi, np.pi)
+        angle = (
+            np.arctan2(to_robot[1], to_robot[0])
+            if self.rng.random() < 0.5
+            else self.rng.uniform(-np.pi, np.pi)
+        )
         shift = self.speed[i] * step * np.array([np.cos(angle), np.sin(angle)])
-        gap = clearance(pose[None], self.where.outline, (self.centre[i] + shift)[None], self.radius[i : i + 1])[0]
+        gap = clearance(
+            pose[None], self.where.outline, (self.centre[i] + shift)[None], self.radius[i : i + 1]
+        )[0]
         return shift if gap > 0.01 else np.zeros(2)
 
 
 def sensor_for(where: Course, rng: np.random.Generator) -> Sensor:
-    """Drawn anew until the robot may drive at all: with too short a range the safe speed is next to nothing."""
+    """Drawn anew until the robot may drive at all: with too short a range the safe speed is next to
+    nothing."""
     while True:
-        sensor = Sensor(reach=rng.uniform(0.6, 3.0), scan_time=rng.choice([0.1, 0.26, 0.5]),
-                        reaction_time=rng.choice([0.0, 0.1, 0.5]), unseen_speed=rng.uniform(0.0, 0.35))
-        if safe_speed(sensor.reach, sensor.scan_time + sensor.reaction_time, float(where.braking.min()),
-                      obstacle_speed=sensor.unseen_speed) >= 0.05:
+        sensor = Sensor(
+            reach=rng.uniform(0.6, 3.0),
+            scan_time=rng.choice([0.1, 0.26, 0.5]),
+            reaction_time=rng.choice([0.0, 0.1, 0.5]),
+            unseen_speed=rng.uniform(0.0, 0.35),
+        )
+        if (
+            safe_speed(
+                sensor.reach,
+                sensor.scan_time + sensor.reaction_time,
+                float(where.braking.min()),
+                obstacle_speed=sensor.unseen_speed,
+            )
+            >= 0.05
+        ):
             return sensor
 
 
@@ -122,7 +156,9 @@ def test_free_way_costs_one_scan(bend: Course) -> None:
 
 def test_blocked_way_stops_and_resumes(bend: Course) -> None:
     block = Obstacle((2.0, 0.5), 0.2)
-    run = run_encounter(bend, Sensor(2.0, 0.1, 0.1), lambda t, _: [block] if t < 8 else [], longest=60.0)
+    run = run_encounter(
+        bend, Sensor(2.0, 0.1, 0.1), lambda t, _: [block] if t < 8 else [], longest=60.0
+    )
     assert not run.hit
     assert run.v[run.times < 8].min() == 0
     assert run.v[np.argmin(np.abs(run.times - 7.9))] == 0
@@ -132,6 +168,7 @@ def test_blocked_way_stops_and_resumes(bend: Course) -> None:
 
 def test_known_velocity_lets_pass_what_leaves(bend: Course) -> None:
     """A disc that drives away to the side need not stop a robot that knows its velocity."""
+
     def world(t: float, _: np.ndarray) -> list[Obstacle]:
         return [Obstacle((2.0, 0.2 + 0.5 * t), 0.2, (0.0, 0.5), 0.0)]
 
@@ -155,13 +192,16 @@ def test_halving_rule_promises_nothing(bend: Course) -> None:
     """With the thesis's rule there is a speed at which the stopping distance is not kept."""
     sensor = Sensor(0.6, 0.5, 0.5)
     block = Obstacle((2.6, 0.35), 0.3)
-    run = run_encounter(bend, sensor, lambda t, _: [block] if t < 20 else [], planner=halving_plan, longest=60.0)
+    run = run_encounter(
+        bend, sensor, lambda t, _: [block] if t < 20 else [], planner=halving_plan, longest=60.0
+    )
     assert not run.kept
     assert run.arrived
 
 
 def test_safe_speed_closed_form() -> None:
-    """SOURCES 004: 0.51, 0.52, 0.54 m/s for 1.51, 1.70, 2.55 m/s^2; the thesis's 0.6 without braking."""
+    """SOURCES 004: 0.51, 0.52, 0.54 m/s for 1.51, 1.70, 2.55 m/s^2; the thesis's 0.6 without
+    braking."""
     for braking, speed in ((1.51, 0.51), (1.70, 0.52), (2.55, 0.54)):
         v = safe_speed(0.6, 1.0, braking)
         assert v == pytest.approx(speed, abs=0.006)
@@ -187,14 +227,18 @@ def test_a_visitor_walks_its_track_where_the_robot_was() -> None:
     (first,) = world(2.0, pose)
     assert first.centre == pytest.approx((3.4, 4.0 + 1.0 + 0.6 + 0.1))
     assert first.deviation == pytest.approx(0.2)
-    assert clearance(pose[None], outline, np.array([first.centre]), np.array([0.1])) == pytest.approx([0.6])
+    assert clearance(
+        pose[None], outline, np.array([first.centre]), np.array([0.1])
+    ) == pytest.approx([0.6])
     (later,) = world(4.5, np.zeros(3))  # where the robot has gone since does not matter
     assert later.centre == pytest.approx((3.4 - 0.5, 5.7))
     assert world(5.0, pose) == []
 
 
 def test_a_body_beside_its_plan_needs_the_allowance(bend: Course) -> None:
-    """A robot that runs 4 cm beside the plan, towards the obstacle, is safe with the allowance for it."""
+    """A robot that runs 4 cm beside the plan, towards the obstacle, is safe with the allowance for
+    it."""
+
     def beside(plan: SpeedPlan, now: float, _: object) -> np.ndarray:
         x, y, yaw = bend.poses(plan.sampled(now + TIME_STEP, 1)[0])[0]
         return np.array([x - 0.04 * np.sin(yaw), y + 0.04 * np.cos(yaw), yaw])
@@ -202,8 +246,14 @@ def test_a_body_beside_its_plan_needs_the_allowance(bend: Course) -> None:
     block = Obstacle((1.0, 0.71), 0.1)
     outcomes = []
     for allowance in (0.0, 0.05):
-        run = run_encounter(bend, Sensor(2.0, 0.1, 0.1), lambda t, _: [block] if t < 6 else [], longest=60.0,
-                            body=beside, allowance=allowance)
+        run = run_encounter(
+            bend,
+            Sensor(2.0, 0.1, 0.1),
+            lambda t, _: [block] if t < 6 else [],
+            longest=60.0,
+            body=beside,
+            allowance=allowance,
+        )
         outcomes.append((run.hit, run.kept))
         assert run.arrived
     assert outcomes[1] == (False, True)

@@ -28,8 +28,13 @@ def powerbot_like(cog: tuple[float, float, float] = (0.0, 0.0, H)) -> Platform:
     """Origin at the centre of gravity by default, as the formulas of SOURCES 004 have it."""
     contacts = ((FRONT, TRACK), (FRONT, -TRACK), (-REAR, TRACK), (-REAR, -TRACK))
     body = Body(120.0, 8.0, cog, contacts, (NAN,) * 4, (True, True, False, False))
-    return differential_platform("powerbot-like", half_track=TRACK, radius=0.12, body=body,
-                                 footprint=((0.3, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.3, -0.3)))
+    return differential_platform(
+        "powerbot-like",
+        half_track=TRACK,
+        radius=0.12,
+        body=body,
+        footprint=((0.3, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.3, -0.3)),
+    )
 
 
 def slope_path(angle: float) -> Path:
@@ -37,13 +42,15 @@ def slope_path(angle: float) -> Path:
 
 
 CURVE = Path.through([[0, 0], [1, 0.4], [2, -0.2], [3, 0.5]])
-TURNING = Path.through([[0, 0], [1, 0.4], [2, -0.2], [3, 0.5]], heading=[0.2, 1.0, 0.1, -0.7],
-                       turning_length=0.5)
+TURNING = Path.through(
+    [[0, 0], [1, 0.4], [2, -0.2], [3, 0.5]], heading=[0.2, 1.0, 0.1, -0.7], turning_length=0.5
+)
 
 
 @pytest.mark.parametrize(("degrees", "expected"), [(0, 2.55), (6, 3.56), (-6, 1.51)])
 def test_braking_limits_of_the_thesis_robot(degrees, expected):
-    """SOURCES 004: 2.55 flat, 3.56 uphill, 1.51 m/s^2 downhill (the thesis's own formula gives 2.70)."""
+    """SOURCES 004: 2.55 flat, 3.56 uphill, 1.51 m/s^2 downhill (the thesis's own formula gives
+    2.70)."""
     samples = sample_path(slope_path(np.radians(degrees)), np.array([1.5]))
     rows = Slip(MU, sides=64).rows(samples, powerbot_like())
     slowing = rows.a < -1e-9
@@ -65,7 +72,8 @@ def test_tip_limits_of_the_thesis_robot(degrees, slope_part):
 
 
 def test_slip_is_the_formula_of_two_axles():
-    """||(f_t, f_n)|| <= mu N_A with N_A = (0.218 f_z - 0.215 f_t)/0.35, as 16-gon, at random states."""
+    """||(f_t, f_n)|| <= mu N_A with N_A = (0.218 f_z - 0.215 f_t)/0.35, as 16-gon, at random
+    states."""
     rng = np.random.default_rng(1)
     samples = sample_path(CURVE, np.linspace(0.1, CURVE.length - 0.1, 40))
     rows = Slip(MU).rows(samples, powerbot_like())
@@ -81,7 +89,9 @@ def test_lateral_tip_is_h_f_n_against_half_the_track():
     samples = sample_path(CURVE, np.linspace(0.1, CURVE.length - 0.1, 40))
     rows = Tip().rows(samples, powerbot_like())
     k = np.abs(samples.curvature)
-    largest = np.min(np.where(rows.b > 1e-9, rows.c / np.where(rows.b > 1e-9, rows.b, 1.0), np.inf), axis=1)
+    largest = np.min(
+        np.where(rows.b > 1e-9, rows.c / np.where(rows.b > 1e-9, rows.b, 1.0), np.inf), axis=1
+    )
     curved = k > 0.05
     np.testing.assert_allclose(largest[curved], (TRACK / H * G / k)[curved], rtol=1e-9)
 
@@ -102,8 +112,14 @@ def test_specific_force_is_the_acceleration_of_the_centre_of_gravity(path, cog):
         cos, sin = np.cos(samples.yaw), np.sin(samples.yaw)
         arm = np.column_stack([cos * cog[0] - sin * cog[1], sin * cog[0] + cos * cog[1]])
         world = samples.position[:, :2] + arm
-        second = (-world[0] + 16 * world[1] - 30 * world[2] + 16 * world[3] - world[4]) / (12 * h**2)
-        expected = [cos[2] * second[0] + sin[2] * second[1], -sin[2] * second[0] + cos[2] * second[1], G]
+        second = (-world[0] + 16 * world[1] - 30 * world[2] + 16 * world[3] - world[4]) / (
+            12 * h**2
+        )
+        expected = [
+            cos[2] * second[0] + sin[2] * second[1],
+            -sin[2] * second[0] + cos[2] * second[1],
+            G,
+        ]
         force = specific_force(sample_path(path, np.array([s0])), body)
         np.testing.assert_allclose((force.a * u + force.b * x + force.c)[0], expected, atol=1e-5)
 
@@ -136,8 +152,12 @@ def test_acceleration_is_the_rate_of_translational_speed():
 
 
 def test_turn_on_the_spot_counts_no_translation():
-    spot = Path.through([[0, 0], [1, 0], [1.0, 1e-9], [2, 0]], knots=[0, 1, 2, 3], heading=[0, 0, 2, 2],
-                        turning_length=0.5)
+    spot = Path.through(
+        [[0, 0], [1, 0], [1.0, 1e-9], [2, 0]],
+        knots=[0, 1, 2, 3],
+        heading=[0, 0, 2, 2],
+        turning_length=0.5,
+    )
     samples = sample_path(spot, np.linspace(0, spot.length, 7))
     pure = samples.__class__(**{**samples.__dict__, "twist": np.tile([0.0, 0.0, 2.0], (7, 1))})
     assert np.all(np.isinf(Speed(1.0).rows(pure, None).sd2_max))
@@ -164,7 +184,8 @@ def test_four_wheel_loads_balance_force_and_moments():
 
 
 def test_mecanum_slip_by_hand():
-    """Forward push on level ground: every roller carries a force of m a / (4 cos 45), loads shift by h a."""
+    """Forward push on level ground: every roller carries a force of m a / (4 cos 45), loads shift
+    by h a."""
     robot, mu, push = loc8(), 0.4, 1.0
     straight = Path.through([[0, 0], [2, 0]], heading=[0, 0], turning_length=0.5)
     rows = Slip(mu).rows(sample_path(straight, np.array([1.0])), robot)
@@ -180,7 +201,9 @@ def test_per_wheel_slip_is_stricter_in_a_curve_and_equal_on_a_straight():
 
     def top_speed(limit: Slip) -> np.ndarray:
         rows = limit.rows(curve, robot)
-        return np.min(np.where(rows.b > 1e-9, rows.c / np.where(rows.b > 1e-9, rows.b, 1), np.inf), axis=1)
+        return np.min(
+            np.where(rows.b > 1e-9, rows.c / np.where(rows.b > 1e-9, rows.b, 1), np.inf), axis=1
+        )
 
     assert np.all(top_speed(Slip(0.5, per_wheel=True)) <= top_speed(Slip(0.5)) * (1 + 1e-9))
     straight = sample_path(slope_path(0.1), np.array([1.0]))
@@ -192,8 +215,14 @@ def test_per_wheel_slip_is_stricter_in_a_curve_and_equal_on_a_straight():
 
 
 def test_support_polygon_is_counted_once():
-    body = Body(1.0, 1.0, (0.1, 0.0, 0.2), ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 0.5), (1, 0)), (NAN,) * 6,
-                (True,) * 6)
+    body = Body(
+        1.0,
+        1.0,
+        (0.1, 0.0, 0.2),
+        ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 0.5), (1, 0)),
+        (NAN,) * 6,
+        (True,) * 6,
+    )
     normals, distances = support_edges(body)
     assert len(normals) == 4
     np.testing.assert_allclose(np.sort(distances), [0.9, 1.0, 1.0, 1.1])
@@ -210,13 +239,25 @@ def test_speed_bounds_along_the_path():
     np.testing.assert_allclose(np.sqrt(profile.sd2_max)[[0, 10, 20, 30]], [1.0, 0.75, 0.5, 0.5])
 
 
-@pytest.mark.parametrize("build", [
-    lambda: Speed(0.0), lambda: Speed(NAN), lambda: YawRate(-1.0), lambda: WheelSpeed(np.inf),
-    lambda: WheelAcceleration(0.0), lambda: Acceleration(1.0, -1.0), lambda: Slip(0.0),
-    lambda: Slip(0.3, sides=3), lambda: Tip(-0.1), lambda: SpeedZones(((1.0, 0.5, 1.0),)),
-    lambda: SpeedZones(((0.0, 1.0, -1.0),)),
-    lambda: SpeedProfile((), ()), lambda: SpeedProfile((0.0, 1.0), (1.0,)),
-    lambda: SpeedProfile((0.0, 1.0), (1.0, NAN))])
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: Speed(0.0),
+        lambda: Speed(NAN),
+        lambda: YawRate(-1.0),
+        lambda: WheelSpeed(np.inf),
+        lambda: WheelAcceleration(0.0),
+        lambda: Acceleration(1.0, -1.0),
+        lambda: Slip(0.0),
+        lambda: Slip(0.3, sides=3),
+        lambda: Tip(-0.1),
+        lambda: SpeedZones(((1.0, 0.5, 1.0),)),
+        lambda: SpeedZones(((0.0, 1.0, -1.0),)),
+        lambda: SpeedProfile((), ()),
+        lambda: SpeedProfile((0.0, 1.0), (1.0,)),
+        lambda: SpeedProfile((0.0, 1.0), (1.0, NAN)),
+    ],
+)
 def test_numbers_that_make_no_limit_are_refused(build):
     with pytest.raises(ArgumentError):
         build()

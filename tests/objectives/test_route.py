@@ -19,7 +19,9 @@ EXPERIMENT = Path(__file__).parents[2] / "problems" / "powerbot" / "experiment_1
 def calm(objective: RouteObjective, count: int, seed: int = 0) -> np.ndarray:
     """Candidates near the middle of the bounds: no wild bends."""
     low, high = objective.bounds.T
-    return (low + high) / 2 + 0.2 * (high - low) * (np.random.default_rng(seed).random((count, len(low))) - 0.5)
+    return (low + high) / 2 + 0.2 * (high - low) * (
+        np.random.default_rng(seed).random((count, len(low))) - 0.5
+    )
 
 
 def test_lengths_are_those_of_the_path() -> None:
@@ -36,7 +38,9 @@ def test_durations_of_swarms_are_near_those_of_time_scaling(objective: RouteObje
     costs = objective.evaluate(z).cost
     for x, cost in zip(z, costs, strict=True):
         assert cost == pytest.approx(objective.score(x).cost[0], rel=5e-3)
-        assert objective.evaluate(x[None]).cost[0] == pytest.approx(cost, rel=1e-12)  # alone as in the swarm
+        assert objective.evaluate(x[None]).cost[0] == pytest.approx(
+            cost, rel=1e-12
+        )  # alone as in the swarm
 
 
 def test_straight_and_free_is_the_shortest() -> None:
@@ -55,7 +59,9 @@ def test_a_straight_start_to_goal_takes_the_time_of_the_book() -> None:
     objective = replace(objective, values=straight)
     x = straight[1:-1].ravel()
     wanted = LENGTH / 2.1 + 2.1 / 0.55
-    assert objective.score(x).cost[0] == pytest.approx(wanted, rel=1e-5)  # the slow-down of time scaling
+    assert objective.score(x).cost[0] == pytest.approx(
+        wanted, rel=1e-5
+    )  # the slow-down of time scaling
     assert objective.evaluate(x[None]).cost[0] == pytest.approx(wanted, rel=2e-3)
 
 
@@ -70,7 +76,11 @@ def test_violation_is_the_depth_by_brute_force(seed: int) -> None:
         depth = max(0.0, -float(np.min(rooms)))
         assert objective.score(x).violation[0] == pytest.approx(depth, abs=1e-3)
         half_a_step = 0.04
-        assert objective.evaluate(x[None]).violation[0] == pytest.approx(depth + RESERVE, abs=half_a_step) or not depth
+        assert (
+            objective.evaluate(x[None]).violation[0]
+            == pytest.approx(depth + RESERVE, abs=half_a_step)
+            or not depth
+        )
 
 
 @pytest.mark.parametrize("seed", range(1, 7))

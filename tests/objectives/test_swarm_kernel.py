@@ -1,4 +1,5 @@
-"""The compiled swarm against the readable prediction: the same formulas, to 1e-12 of the wheel travel."""
+"""The compiled swarm against the readable prediction: the same formulas, to 1e-12 of the wheel
+travel."""
 
 from __future__ import annotations
 
@@ -14,25 +15,37 @@ from trajopt.problem import Problem, load_problem
 pytest.importorskip("numba")
 
 FILES = sorted((Path(__file__).parents[2] / "problems" / "smdw").glob("scenario_*.toml")) + sorted(
-    (Path(__file__).parents[2] / "problems" / "smdw").glob("table_*.toml"))
+    (Path(__file__).parents[2] / "problems" / "smdw").glob("table_*.toml")
+)
 SPACES = [("p1",), ("p2",), ("p1", "p2"), ("p1", "p2", "duration"), ("p1", "p2", "heading")]
 
 
 def objective(file: Path, *free: str, enabled: bool = True, **actuator: float) -> TerminalObjective:
     problem = load_problem(file)
     assert isinstance(problem, Problem)
-    return terminal_objective(with_free(problem.replace(actuator={"enabled": enabled, **actuator}), *free))
+    return terminal_objective(
+        with_free(problem.replace(actuator={"enabled": enabled, **actuator}), *free)
+    )
 
 
 @pytest.mark.parametrize("free", SPACES)
 @pytest.mark.parametrize("file", FILES, ids=lambda f: f.stem)
 @pytest.mark.parametrize("count", [1, 50])
-def test_final_states_and_costs_agree_with_the_readable_form(file: Path, free: tuple[str, ...], count: int) -> None:
+def test_final_states_and_costs_agree_with_the_readable_form(
+    file: Path, free: tuple[str, ...], count: int
+) -> None:
     asked = objective(file, *free)
     z = np.random.default_rng(count).uniform(*asked.bounds.T, size=(count, asked.dimension))
     points = asked.control_points(z.T)
-    end = roll_out(step_grid(asked.basis, asked.steps), asked.model, asked.actuator, points.x, points.y, points.yaw,
-                   points.duration)
+    end = roll_out(
+        step_grid(asked.basis, asked.steps),
+        asked.model,
+        asked.actuator,
+        points.x,
+        points.y,
+        points.yaw,
+        points.duration,
+    )
     wanted = np.vstack([end.x, end.y, end.yaw, *end.wheels])
     scale = max(1.0, float(np.max(np.abs(wanted))))
     final = asked.predict(z.T)
@@ -40,20 +53,41 @@ def test_final_states_and_costs_agree_with_the_readable_form(file: Path, free: t
     assert np.max(np.abs(got - wanted)) <= 1e-12 * scale
     if asked._prescribed is not None:
         assert np.max(np.abs(asked._prescribed[0].predict(z) - wanted)) <= 1e-12 * scale
-    cost = np.sum([np.broadcast_to(t, (1, count))[0] for t in asked.named_terms(end).values()], axis=0)
-    assert np.max(np.abs(asked.evaluate(z).cost - cost)) <= 3e-11 * scale  # gains up to 12.5 on four angles
+    cost = np.sum(
+        [np.broadcast_to(t, (1, count))[0] for t in asked.named_terms(end).values()], axis=0
+    )
+    assert (
+        np.max(np.abs(asked.evaluate(z).cost - cost)) <= 3e-11 * scale
+    )  # gains up to 12.5 on four angles
 
 
-@pytest.mark.parametrize("actuator", [{"saturation": 1e6, "dead_zone": 0.0}, {"saturation": 30.0, "dead_zone": 0.0},
-                                      {"saturation": 5.0, "dead_zone": 4.9}])
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        {"saturation": 1e6, "dead_zone": 0.0},
+        {"saturation": 30.0, "dead_zone": 0.0},
+        {"saturation": 5.0, "dead_zone": 4.9},
+    ],
+)
 def test_extreme_actuators_agree(actuator: dict[str, float]) -> None:
     asked = objective(FILES[0], "p2", **actuator)
     z = np.random.default_rng(1).uniform(*asked.bounds.T, size=(7, 2))
     points = asked.control_points(z.T)
-    end = roll_out(step_grid(asked.basis, asked.steps), asked.model, asked.actuator, points.x, points.y, points.yaw,
-                   points.duration)
-    readable = np.sum([np.broadcast_to(t, (1, 7))[0] for t in asked.named_terms(end).values()], axis=0)
-    assert np.max(np.abs(asked.evaluate(z).cost - readable)) <= 1e-11 * max(1.0, float(np.max(readable)))
+    end = roll_out(
+        step_grid(asked.basis, asked.steps),
+        asked.model,
+        asked.actuator,
+        points.x,
+        points.y,
+        points.yaw,
+        points.duration,
+    )
+    readable = np.sum(
+        [np.broadcast_to(t, (1, 7))[0] for t in asked.named_terms(end).values()], axis=0
+    )
+    assert np.max(np.abs(asked.evaluate(z).cost - readable)) <= 1e-11 * max(
+        1.0, float(np.max(readable))
+    )
 
 
 def test_affine_costs_agree_with_the_prediction() -> None:

@@ -1,4 +1,5 @@
-"""The terminal cost against the thesis's tables, and the prediction against itself and an ODE solver."""
+"""The terminal cost against the thesis's tables, and the prediction against itself and an ODE
+solver."""
 
 from __future__ import annotations
 
@@ -76,7 +77,8 @@ def test_without_limits_the_prediction_is_exact_on_any_grid(problem, steps):
 
 
 def test_exact_prediction_against_an_ode_solver():
-    """The wheels' and body's motion through the actuator, integrated by scipy with events ignored."""
+    """The wheels' and body's motion through the actuator, integrated by scipy with events
+    ignored."""
     problem = with_actuator(smdw_problem("scenario_1_lateral"), "p1", "p2", "heading")
     objective = terminal_objective(problem)
     x = objective.default
@@ -88,14 +90,20 @@ def test_exact_prediction_against_an_ode_solver():
         value, rate = basis.matrix(u)[0], basis.matrix(u, 1)[0] * speed
         angle = value @ points.yaw[:, 0]
         dx, dy, da = rate @ points.x[:, 0], rate @ points.y[:, 0], rate @ points.yaw[:, 0]
-        twist = [np.cos(angle) * dx + np.sin(angle) * dy, np.cos(angle) * dy - np.sin(angle) * dx, da]
+        twist = [
+            np.cos(angle) * dx + np.sin(angle) * dy,
+            np.cos(angle) * dy - np.sin(angle) * dx,
+            da,
+        ]
         wheels = np.asarray(objective.actuator.output(objective.model.inverse @ twist))
         vx, vy, wz = objective.model.forward @ wheels
         c, s = np.cos(state[2]), np.sin(state[2])
         return [c * vx - s * vy, s * vx + c * vy, wz, *wheels]
 
     start = [*problem.start.pose, 0, 0, 0, 0]
-    end = solve_ivp(rates, (0, problem.spline.duration), start, rtol=1e-8, atol=1e-9, max_step=2e-3).y[:, -1]
+    end = solve_ivp(
+        rates, (0, problem.spline.duration), start, rtol=1e-8, atol=1e-9, max_step=2e-3
+    ).y[:, -1]
     final = objective.predict_exactly(x)
     got = np.ravel([final.x, final.y, final.yaw, *final.wheels])
     np.testing.assert_allclose(got, end, atol=5e-4)
@@ -104,7 +112,10 @@ def test_exact_prediction_against_an_ode_solver():
 def test_step_averages_converge_to_the_exact_prediction(scenario):
     objective = terminal_objective(with_actuator(scenario, "p1", "p2", "heading"))
     exact = objective.score(objective.default).cost[0]
-    errors = [abs(on_grid(objective, n).evaluate(objective.default[None]).cost[0] - exact) for n in (252, 2001, 20001)]
+    errors = [
+        abs(on_grid(objective, n).evaluate(objective.default[None]).cost[0] - exact)
+        for n in (252, 2001, 20001)
+    ]
     assert errors[2] < errors[0] / 20
     assert errors[1] < 1e-3
 
@@ -115,13 +126,30 @@ def test_numba_and_numpy_agree():
 
     rng = np.random.default_rng(3)
     for name in ("table_5_3", "table_5_3_1s", "scenario_2_lateral"):
-        objective = terminal_objective(with_actuator(smdw_problem(name), "p1", "p2", "heading", "duration"))
+        objective = terminal_objective(
+            with_actuator(smdw_problem(name), "p1", "p2", "heading", "duration")
+        )
         z = rng.uniform(*objective.bounds.T, (40, objective.dimension)).T
         points, grid = objective.control_points(z), step_grid(objective.basis, 252)
         assert compiled.fits(grid, objective.model, points.yaw)
-        a = roll_out(grid, objective.model, objective.actuator, points.x, points.y, points.yaw, points.duration)
-        b = compiled.roll_out_swarm(grid, objective.model, objective.actuator, points.x, points.y, points.yaw,
-                                    points.duration)
+        a = roll_out(
+            grid,
+            objective.model,
+            objective.actuator,
+            points.x,
+            points.y,
+            points.yaw,
+            points.duration,
+        )
+        b = compiled.roll_out_swarm(
+            grid,
+            objective.model,
+            objective.actuator,
+            points.x,
+            points.y,
+            points.yaw,
+            points.duration,
+        )
         np.testing.assert_allclose(b, np.vstack([a.x, a.y, a.yaw, *a.wheels]), atol=1e-12)
 
 
@@ -129,7 +157,9 @@ def test_a_swarm_is_its_candidates(problem):
     objective = terminal_objective(with_actuator(problem, "p1", "p2", "heading", "duration"))
     x = np.random.default_rng(0).uniform(*objective.bounds.T, (7, objective.dimension))
     together = objective.evaluate(x).cost
-    np.testing.assert_allclose(together, [objective.evaluate(row[None]).cost[0] for row in x], atol=1e-10)
+    np.testing.assert_allclose(
+        together, [objective.evaluate(row[None]).cost[0] for row in x], atol=1e-10
+    )
 
 
 def test_wheel_identities_hold_along_every_path(problem):
@@ -156,9 +186,12 @@ def test_matrix_does_not_depend_on_duration(scenario):
 
 
 def test_lattice_is_exact_in_the_theses_convention_too(problem):
-    """The thesis's kinematics (y right, yaw counter-clockwise) is ours with the y column negated."""
+    """The thesis's kinematics (y right, yaw counter-clockwise) is ours with the y column
+    negated."""
     mirrored = loc8().inverse * [1, -1, 1]
-    thesis = TerminalObjective(problem, loc8(), kinematics=Kinematics(mirrored, np.linalg.pinv(mirrored)))
+    thesis = TerminalObjective(
+        problem, loc8(), kinematics=Kinematics(mirrored, np.linalg.pinv(mirrored))
+    )
     points, _ = lattice_points(thesis.affine_part(), thesis.bounds)
     assert 1 <= len(points) <= 15
     assert max(thesis.score(x).cost[0] for x in points) < 1e-9

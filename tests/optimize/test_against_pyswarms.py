@@ -1,4 +1,5 @@
-"""gbest PSO is statistically no worse than pyswarms's with equal parameters; the test finds a PSO that is."""
+"""gbest PSO is statistically no worse than pyswarms's with equal parameters; the test finds a PSO
+that is."""
 
 from __future__ import annotations
 
@@ -32,12 +33,18 @@ def rastrigin(x: Array) -> Array:
 
 
 def rosenbrock(x: Array) -> Array:
-    return np.asarray((100.0 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1.0 - x[:, :-1]) ** 2).sum(axis=1))
+    return np.asarray(
+        (100.0 * (x[:, 1:] - x[:, :-1] ** 2) ** 2 + (1.0 - x[:, :-1]) ** 2).sum(axis=1)
+    )
 
 
 def ackley(x: Array) -> Array:
-    return np.asarray(20.0 - 20.0 * np.exp(-0.2 * np.sqrt((x * x).mean(axis=1))) + np.e
-                      - np.exp(np.cos(2 * np.pi * x).mean(axis=1)))
+    return np.asarray(
+        20.0
+        - 20.0 * np.exp(-0.2 * np.sqrt((x * x).mean(axis=1)))
+        + np.e
+        - np.exp(np.cos(2 * np.pi * x).mean(axis=1))
+    )
 
 
 EQUAL = replace(constriction(), boundary="mirror")
@@ -50,8 +57,13 @@ def theirs() -> list[list[float]]:
 
 
 def costs(method: Optimizer) -> list[list[float]]:
-    return [[minimize(f, BOX, optimizer=method, seed=seed, budget=Budget(EVALUATIONS)).fun for seed in range(SEEDS)]
-            for f in FUNCTIONS]
+    return [
+        [
+            minimize(f, BOX, optimizer=method, seed=seed, budget=Budget(EVALUATIONS)).fun
+            for seed in range(SEEDS)
+        ]
+        for f in FUNCTIONS
+    ]
 
 
 def test_not_significantly_worse_on_any_function(theirs: list[list[float]]) -> None:
@@ -60,7 +72,9 @@ def test_not_significantly_worse_on_any_function(theirs: list[list[float]]) -> N
 
 
 def test_an_undamped_swarm_is_found_out(theirs: list[list[float]]) -> None:
-    p = holm([no_worse(a, b) for a, b in zip(costs(replace(EQUAL, inertia=0.95)), theirs, strict=True)])
+    p = holm(
+        [no_worse(a, b) for a, b in zip(costs(replace(EQUAL, inertia=0.95)), theirs, strict=True)]
+    )
     assert p.max() < LEVEL
 
 

@@ -14,7 +14,9 @@ from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.base import Budget, Status, best_index, better
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 
-GENERAL = [name for name in optimizer_names() if Capability.RESIDUALS not in optimizer_named(name).needs]
+GENERAL = [
+    name for name in optimizer_names() if Capability.RESIDUALS not in optimizer_named(name).needs
+]
 BOX = np.array([[-2.0, 3.0], [-1.5, 2.5]])
 
 
@@ -29,14 +31,18 @@ def sphere_batch(x):
 @pytest.mark.parametrize("name", optimizer_names())
 def test_solves_the_terminal_problem(name, scenario):
     objective = terminal_objective(scenario)
-    result = minimize(objective, objective.bounds, optimizer=name, seed=1, budget=Budget(evaluations=8000))
+    result = minimize(
+        objective, objective.bounds, optimizer=name, seed=1, budget=Budget(evaluations=8000)
+    )
     assert np.all(result.x >= objective.bounds[:, 0])
     assert np.all(result.x <= objective.bounds[:, 1])
     assert result.fun == pytest.approx(objective.score(result.x).cost[0], abs=1e-15)
     assert result.violation == 0
     assert result.optimizer
     exact = {"lattice": 1e-9, "ipopt": 1e-9, "pso": 1e-6, "slsqp": 1e-3}
-    assert result.fun < exact.get(name, 8.0)  # two folded wheels cost 39 on average over random points
+    assert result.fun < exact.get(
+        name, 8.0
+    )  # two folded wheels cost 39 on average over random points
 
 
 @pytest.mark.parametrize("name", GENERAL)
@@ -62,7 +68,9 @@ def test_budget_of_evaluations_is_kept(name, limit):
         return rosenbrock(x)
 
     result = minimize(counted, BOX, optimizer=name, budget=Budget(evaluations=limit))
-    assert result.nfev <= limit or name == "ipopt"  # IPOPT's own line search may finish an iteration
+    assert (
+        result.nfev <= limit or name == "ipopt"
+    )  # IPOPT's own line search may finish an iteration
     if name != "ipopt":
         # the shape probe, the final score and its proposals come on top
         assert len(calls) <= limit + 6
@@ -77,7 +85,9 @@ def test_budget_of_seconds_ends_the_search(name):
 
 @pytest.mark.parametrize("name", [n for n in GENERAL if n != "ipopt"])
 def test_target_ends_the_search(name):
-    result = minimize(rosenbrock, BOX, optimizer=name, budget=Budget(evaluations=20_000, target=1.0))
+    result = minimize(
+        rosenbrock, BOX, optimizer=name, budget=Budget(evaluations=20_000, target=1.0)
+    )
     assert result.status is Status.TARGET
     assert result.success
     assert result.fun <= 1.0
@@ -87,8 +97,12 @@ def test_target_ends_the_search(name):
 def test_same_seed_same_bits(name):
     problem = smdw_problem("scenario_2_lateral").replace(actuator={"enabled": True})
     objective = terminal_objective(problem)
-    a, b = (minimize(objective, objective.bounds, optimizer=name, seed=5, budget=Budget(evaluations=600))
-            for _ in range(2))
+    a, b = (
+        minimize(
+            objective, objective.bounds, optimizer=name, seed=5, budget=Budget(evaluations=600)
+        )
+        for _ in range(2)
+    )
     assert a.x.tobytes() == b.x.tobytes()
     assert a.fun == b.fun
     np.testing.assert_array_equal(a.history.cost, b.history.cost)
@@ -158,20 +172,42 @@ def test_wrong_shape_is_a_failure():
     assert "shape" in result.first_failure
 
 
-@pytest.mark.parametrize(("arguments", "what"), [
-    ({"bounds": [[0, 1, 2]]}, "bounds"), ({"bounds": [[1, 0]]}, "bounds"), ({"bounds": [[0, np.inf]]}, "bounds"),
-    ({"bounds": "abc"}, "bounds"), ({"bounds": [[0, 1], [2]]}, "bounds"), ({"bounds": [[0, 1j]]}, "bounds"),
-    ({"optimizer": None}, "optimizer"), ({"budget": 500}, "budget"), ({"objective": 3}, "objective"),
-    ({"x0": "ab"}, "x0"), ({"optimizer": "magic"}, "optimizer"), ({"seed": -1}, "seed"), ({"seed": 0.5}, "seed"),
-])
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        ({"bounds": [[0, 1, 2]]}, "bounds"),
+        ({"bounds": [[1, 0]]}, "bounds"),
+        ({"bounds": [[0, np.inf]]}, "bounds"),
+        ({"bounds": "abc"}, "bounds"),
+        ({"bounds": [[0, 1], [2]]}, "bounds"),
+        ({"bounds": [[0, 1j]]}, "bounds"),
+        ({"optimizer": None}, "optimizer"),
+        ({"budget": 500}, "budget"),
+        ({"objective": 3}, "objective"),
+        ({"x0": "ab"}, "x0"),
+        ({"optimizer": "magic"}, "optimizer"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 0.5}, "seed"),
+    ],
+)
 def test_bad_arguments(arguments, what):
     with pytest.raises(ArgumentError, match=what):
         minimize(**{"objective": sphere_batch, "bounds": BOX, **arguments})
 
 
-@pytest.mark.parametrize("arguments", [{"evaluations": 0}, {"seconds": 0.0}, {"evaluations": None},
-                                       {"evaluations": 10.5}, {"evaluations": "10"}, {"evaluations": True},
-                                       {"seconds": np.inf}, {"target": np.nan}])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"evaluations": 0},
+        {"seconds": 0.0},
+        {"evaluations": None},
+        {"evaluations": 10.5},
+        {"evaluations": "10"},
+        {"evaluations": True},
+        {"seconds": np.inf},
+        {"target": np.nan},
+    ],
+)
 def test_bad_budgets(arguments):
     with pytest.raises(ArgumentError, match="budget"):
         Budget(**arguments)
@@ -197,7 +233,11 @@ finite = st.floats(0, 10)
 
 
 @settings(max_examples=200, deadline=None)
-@given(st.lists(st.tuples(finite, st.sampled_from([0.0, 0.0, 1e-12, 0.5, 2.0])), min_size=1, max_size=12))
+@given(
+    st.lists(
+        st.tuples(finite, st.sampled_from([0.0, 0.0, 1e-12, 0.5, 2.0])), min_size=1, max_size=12
+    )
+)
 def test_best_index_is_never_beaten(pairs):
     cost, violation = np.array(pairs).T
     i = best_index(cost, violation)

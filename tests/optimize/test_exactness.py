@@ -18,7 +18,9 @@ SOLVABLE = [name for name in SMDW if name != "table_5_3_1s"]
 
 
 def through_actuators(name):
-    problem = smdw_problem(name).replace(actuator={"enabled": True, "saturation": 30.0, "dead_zone": 2.3})
+    problem = smdw_problem(name).replace(
+        actuator={"enabled": True, "saturation": 30.0, "dead_zone": 2.3}
+    )
     return terminal_objective(with_free(problem, "p1", "p2", "heading"))
 
 
@@ -62,7 +64,9 @@ def test_lattice_finds_every_solution_that_brute_force_finds(problem):
     points, _ = lattice_points(part, objective.bounds)
     inverse = np.linalg.inv(part.matrix)
     found = set()
-    for x in np.stack(np.meshgrid(*[np.linspace(a, b, 80) for a, b in objective.bounds]), -1).reshape(-1, 2):
+    for x in np.stack(
+        np.meshgrid(*[np.linspace(a, b, 80) for a, b in objective.bounds]), -1
+    ).reshape(-1, 2):
         turns = np.round((part.matrix @ x + part.offset) / part.period)
         z = inverse @ (part.period * turns - part.offset)
         if np.all((z >= objective.bounds[:, 0]) & (z <= objective.bounds[:, 1])):
@@ -72,7 +76,9 @@ def test_lattice_finds_every_solution_that_brute_force_finds(problem):
 
 def test_without_lattice_points_the_best_of_the_box_is_found(scenario):
     """A small space holds no lattice point; the arrangement's best vertex beats a fine grid."""
-    small = scenario.replace(space={"x": [0.0, 2.3], "y": [-0.01, 0.8]}).replace({"spline.free": ["p2"]})
+    small = scenario.replace(space={"x": [0.0, 2.3], "y": [-0.01, 0.8]}).replace(
+        {"spline.free": ["p2"]}
+    )
     objective = terminal_objective(small)
     box = np.array([[1.0, 1.2], [0.1, 0.2]])
     result = Lattice().minimize(objective, box, rng=np.random.default_rng(0), budget=Budget())
@@ -120,14 +126,18 @@ def test_a_huge_space_is_no_trouble(scenario):
 @pytest.mark.parametrize("evaluations", [1, 40])
 def test_lattice_keeps_a_small_budget(evaluations):
     objective = through_actuators("scenario_1_lateral")
-    result = minimize(objective, objective.bounds, optimizer="lattice", budget=Budget(evaluations=evaluations))
+    result = minimize(
+        objective, objective.bounds, optimizer="lattice", budget=Budget(evaluations=evaluations)
+    )
     assert result.nfev <= evaluations
     assert np.isfinite(result.fun)
 
 
 def test_all_four_wheels_cannot_be_had(scenario):
     # problem files refuse more than two critical wheels; the optimizer must find out by itself
-    every = scenario.model_copy(update={"goal": scenario.goal.model_copy(update={"critical": WHEELS})})
+    every = scenario.model_copy(
+        update={"goal": scenario.goal.model_copy(update={"critical": WHEELS})}
+    )
     objective = terminal_objective(every)
     result = minimize(objective, objective.bounds, optimizer="lattice")
     assert result.status is Status.NO_EXACT
@@ -145,6 +155,8 @@ def test_thesis_presets_have_the_printed_parameters(preset):
 def test_swarm_stays_inside_with_reset_and_reflect(scenario):
     objective = terminal_objective(scenario)
     for name in ("pso", "pso-thesis-enhanced"):
-        samples = minimize(objective, objective.bounds, optimizer=name, budget=Budget(evaluations=2000)).history.samples
+        samples = minimize(
+            objective, objective.bounds, optimizer=name, budget=Budget(evaluations=2000)
+        ).history.samples
         assert np.all(samples >= objective.bounds[:, 0] - 1e-12)
         assert np.all(samples <= objective.bounds[:, 1] + 1e-12)

@@ -1,4 +1,5 @@
-"""An optimizer in one file of 30 lines is known everywhere by its name, and the package is not touched."""
+"""An optimizer in one file of 30 lines is known everywhere by its name, and the package is not
+touched."""
 
 from __future__ import annotations
 
@@ -16,13 +17,24 @@ from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "tests" / "data" / "plugins" / "evolution.py"
 NAME = "evolution-strategy"
-LOOPS = ("tests/optimize/test_contract.py", "tests/report/test_run_folder.py", "tests/asoc/test_design.py")
+LOOPS = (
+    "tests/optimize/test_contract.py",
+    "tests/report/test_run_folder.py",
+    "tests/asoc/test_design.py",
+)
 SCENARIO = "problems/smdw/scenario_1_lateral.toml"
 
 
 def run(*arguments: str, plugins: str = str(FILE)) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=300,
-                          check=False, env={**os.environ, "TRAJOPT_PLUGINS": plugins})
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+        env={**os.environ, "TRAJOPT_PLUGINS": plugins},
+    )
 
 
 def test_the_file_has_30_lines() -> None:
@@ -34,7 +46,12 @@ def test_it_is_listed_and_made_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TRAJOPT_PLUGINS", str(FILE))
     assert NAME in optimizer_names()
     assert optimizer_named(NAME).name == NAME
-    found = minimize(lambda x: float(((x - 0.3) ** 2).sum()), [[-1.0, 2.0]] * 3, optimizer=NAME, budget=Budget(3000))
+    found = minimize(
+        lambda x: float(((x - 0.3) ** 2).sum()),
+        [[-1.0, 2.0]] * 3,
+        optimizer=NAME,
+        budget=Budget(3000),
+    )
     assert found.fun < 1e-6
     monkeypatch.setenv("TRAJOPT_PLUGINS", f"{FILE}{os.pathsep}no/such/file.py")
     with pytest.raises(ArgumentError, match=r"no/such/file\.py"):
@@ -43,22 +60,39 @@ def test_it_is_listed_and_made_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 def test_all_tests_that_loop_over_optimizers_run_it_and_it_passes() -> None:
-    """13 of the contract at least, one of run folders, one of the design problem; nothing without the variable."""
+    """13 of the contract at least, one of run folders, one of the design problem; nothing without
+    the variable."""
     done = run("-m", "pytest", "-p", "no:cacheprovider", "-rA", "-k", NAME, *LOOPS)
     assert done.returncode == 0, done.stdout[-3000:]
-    passed = [line for line in done.stdout.splitlines() if line.startswith("PASSED") and NAME in line]
+    passed = [
+        line for line in done.stdout.splitlines() if line.startswith("PASSED") and NAME in line
+    ]
     for file, least in zip(LOOPS, (13, 1, 1), strict=True):
         assert sum(file in line for line in passed) >= least
-    without = run("-m", "pytest", "-p", "no:cacheprovider", "--collect-only", "-k", NAME, *LOOPS, plugins="")
+    without = run(
+        "-m", "pytest", "-p", "no:cacheprovider", "--collect-only", "-k", NAME, *LOOPS, plugins=""
+    )
     assert f"[{NAME}" not in without.stdout
 
 
 def test_commands_know_it_by_the_variable_and_by_the_option() -> None:
     command = "from trajopt.cli import main; main()"
     for extra, plugins in (((), str(FILE)), (("--plugin", str(FILE)), "")):
-        done = run("-c", command, "solve", SCENARIO, "--optimizer", NAME, "--evaluations", "3000", *extra,
-                   plugins=plugins)
-        assert done.returncode in (0, 1), done.stderr  # found; whether it holds is the search's luck
+        done = run(
+            "-c",
+            command,
+            "solve",
+            SCENARIO,
+            "--optimizer",
+            NAME,
+            "--evaluations",
+            "3000",
+            *extra,
+            plugins=plugins,
+        )
+        assert done.returncode in (0, 1), (
+            done.stderr
+        )  # found; whether it holds is the search's luck
         assert "error" not in done.stderr
     unknown = run("-c", command, "solve", SCENARIO, "--optimizer", NAME, plugins="")
     assert unknown.returncode == 2
@@ -69,9 +103,14 @@ def test_commands_know_it_by_the_variable_and_by_the_option() -> None:
 def test_benchmarks_take_it_by_the_variable_and_by_the_option(tmp_path: Path) -> None:
     file = tmp_path / "b.toml"
     command = "from trajopt.cli import main; main()"
-    for optimizers, extra, plugins in (("'pso'", ("--plugin", str(FILE)), ""), (f"'pso', '{NAME}'", (), str(FILE))):
-        file.write_text(f"seeds = 1\nevaluations = 300\nproblems = ['smdw/scenario_1_lateral/p2']\n"
-                        f"optimizers = [{optimizers}]\n")
+    for optimizers, extra, plugins in (
+        ("'pso'", ("--plugin", str(FILE)), ""),
+        (f"'pso', '{NAME}'", (), str(FILE)),
+    ):
+        file.write_text(
+            f"seeds = 1\nevaluations = 300\nproblems = ['smdw/scenario_1_lateral/p2']\n"
+            f"optimizers = [{optimizers}]\n"
+        )
         store = str(tmp_path / f"rows{len(extra)}")
         done = run("-c", command, "bench", str(file), "--store", store, *extra, plugins=plugins)
         assert done.returncode == 0, done.stderr

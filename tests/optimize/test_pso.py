@@ -30,9 +30,17 @@ from trajopt.optimize.swarm import Swarm
 Array = NDArray[np.float64]
 
 BOX = np.array([[-4.0, 5.0], [-3.0, 6.0], [-1.0, 2.0]])
-OPTIONS = [constriction(), ring(), falling_inertia(), thesis_first(), thesis_enhanced(),
-           ParticleSwarm(boundary="absorb", start="sobol"), local_best(), ParticleSwarm(boundary="mirror"),
-           ParticleSwarm(boundary="invisible", velocity_limit=0.2)]
+OPTIONS = [
+    constriction(),
+    ring(),
+    falling_inertia(),
+    thesis_first(),
+    thesis_enhanced(),
+    ParticleSwarm(boundary="absorb", start="sobol"),
+    local_best(),
+    ParticleSwarm(boundary="mirror"),
+    ParticleSwarm(boundary="invisible", velocity_limit=0.2),
+]
 
 
 def rastrigin(x: Array) -> Array:
@@ -51,14 +59,27 @@ def run(swarm: Swarm, iterations: int) -> Swarm:
 
 def same_bits(a: Swarm, b: Swarm) -> bool:
     names = ("x", "v", "own", "own_cost", "own_violation")
-    return all(getattr(a, n).tobytes() == getattr(b, n).tobytes() for n in names) and a.idle == b.idle
+    return (
+        all(getattr(a, n).tobytes() == getattr(b, n).tobytes() for n in names) and a.idle == b.idle
+    )
 
 
 @settings(max_examples=40, deadline=None)
-@given(before=st.integers(0, 12), after=st.integers(0, 12), seed=st.integers(0, 1000),
-       option=st.sampled_from(range(len(OPTIONS))), kind=st.sampled_from(["PCG64", "Philox", "MT19937", "SFC64"]))
+@given(
+    before=st.integers(0, 12),
+    after=st.integers(0, 12),
+    seed=st.integers(0, 1000),
+    option=st.sampled_from(range(len(OPTIONS))),
+    kind=st.sampled_from(["PCG64", "Philox", "MT19937", "SFC64"]),
+)
 def test_saved_and_resumed_at_any_iteration_gives_the_same_bits(
-        before: int, after: int, seed: int, option: int, kind: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+    before: int,
+    after: int,
+    seed: int,
+    option: int,
+    kind: str,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
     path = tmp_path_factory.mktemp("swarm") / "state.npz"
     options = replace(OPTIONS[option], particles=12)
 
@@ -72,8 +93,9 @@ def test_saved_and_resumed_at_any_iteration_gives_the_same_bits(
 
 
 @pytest.mark.parametrize("options", OPTIONS)
-def test_compiled_iteration_gives_the_bits_of_the_readable_one(options: ParticleSwarm,
-                                                               monkeypatch: pytest.MonkeyPatch) -> None:
+def test_compiled_iteration_gives_the_bits_of_the_readable_one(
+    options: ParticleSwarm, monkeypatch: pytest.MonkeyPatch
+) -> None:
     pytest.importorskip("numba")
     compiled = run(options.swarm(BOX, np.random.default_rng(4)), 60)
     monkeypatch.setattr(swarm_module, "_kernel", lambda: None)
@@ -97,7 +119,11 @@ def test_one_iteration_is_the_documented_update() -> None:
         own[better], own_cost[better] = x[better], cost[better]
         r = rng.random((2, 5, 3))
         leader = own[np.argmin(own_cost)]
-        v = options.inertia * v + options.cognitive * r[0] * (own - x) + options.social * r[1] * (leader - x)
+        v = (
+            options.inertia * v
+            + options.cognitive * r[0] * (own - x)
+            + options.social * r[1] * (leader - x)
+        )
         x = x + v
         np.testing.assert_allclose(swarm.x, x, rtol=1e-13, atol=1e-13)
         x = swarm.x.copy()
@@ -132,10 +158,18 @@ def test_invisible_particles_are_not_evaluated_and_a_lost_swarm_ends() -> None:
 
 
 def test_stagnation_target_and_saved_nonsense() -> None:
-    flat = minimize(lambda x: np.zeros(len(x)), BOX, optimizer=ParticleSwarm(stagnation=7), budget=Budget(10_000))
+    flat = minimize(
+        lambda x: np.zeros(len(x)),
+        BOX,
+        optimizer=ParticleSwarm(stagnation=7),
+        budget=Budget(10_000),
+    )
     assert flat.status is Status.CONVERGED
     assert "7 iterations" in flat.message
-    assert minimize(rastrigin, BOX, optimizer="pso-ring", budget=Budget(100_000, target=1.0)).status is Status.TARGET
+    assert (
+        minimize(rastrigin, BOX, optimizer="pso-ring", budget=Budget(100_000, target=1.0)).status
+        is Status.TARGET
+    )
 
 
 def test_bad_input_is_named(tmp_path: Path) -> None:
@@ -143,8 +177,16 @@ def test_bad_input_is_named(tmp_path: Path) -> None:
     for wrong in (tmp_path / "no.npz", tmp_path / "missing.npz"):
         with pytest.raises(ArgumentError, match=r"Swarm\.save"):
             Swarm.load(wrong)
-    for options in ({"boundary": "glue"}, {"topology": "star"}, {"neighbours": 0}, {"velocity_limit": -1.0},
-                    {"horizon": 0}, {"stagnation": 0}, {"particles": 1}, {"start": "here"}):
+    for options in (
+        {"boundary": "glue"},
+        {"topology": "star"},
+        {"neighbours": 0},
+        {"velocity_limit": -1.0},
+        {"horizon": 0},
+        {"stagnation": 0},
+        {"particles": 1},
+        {"start": "here"},
+    ):
         with pytest.raises(ArgumentError, match=next(iter(options))):
             ParticleSwarm(**options)  # type: ignore[arg-type]
     swarm = ParticleSwarm().swarm(BOX, np.random.default_rng(0))
@@ -163,7 +205,9 @@ def test_restarts_use_the_whole_budget_and_lose_nothing(option: int) -> None:
     once = replace(OPTIONS[option], particles=10, stagnation=5)
     bounds, budget = BOX, Budget(evaluations=3_000)
     plain = minimize(rastrigin, bounds, optimizer=once, seed=4, budget=budget)
-    again = minimize(rastrigin, bounds, optimizer=replace(once, restart=True), seed=4, budget=budget)
+    again = minimize(
+        rastrigin, bounds, optimizer=replace(once, restart=True), seed=4, budget=budget
+    )
     assert plain.nfev < again.nfev == 3_000
     assert again.status is Status.EVALUATIONS
     assert again.fun <= plain.fun

@@ -1,4 +1,5 @@
-"""What optimizers say of their end, and budgets on objectives that are more than a plain function."""
+"""What optimizers say of their end, and budgets on objectives that are more than a plain
+function."""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ from trajopt.optimize.search import minimize, optimizer_names
 from trajopt.study.bench_problems import objective_named
 
 BOX = np.array([[-2.0, 3.0], [-1.5, 2.5]])
-LINE_SEARCH = 40  # evaluations by which IPOPT may pass a budget: it stops between iterations, not inside one
+LINE_SEARCH = (
+    40  # evaluations by which IPOPT may pass a budget: it stops between iterations, not inside one
+)
 
 
 @dataclass
@@ -56,8 +59,15 @@ class Counted:
 
 
 @pytest.mark.parametrize("name", optimizer_names())
-@pytest.mark.parametrize("problem", ["smdw/scenario_1_lateral/p2", "smdw/scenario_1_lateral/p1+p2+heading/limits",
-                                     "asoc/dry_sand", "corridor/1/length"])
+@pytest.mark.parametrize(
+    "problem",
+    [
+        "smdw/scenario_1_lateral/p2",
+        "smdw/scenario_1_lateral/p1+p2+heading/limits",
+        "asoc/dry_sand",
+        "corridor/1/length",
+    ],
+)
 def test_budgets_hold_on_objectives_of_every_kind(name: str, problem: str) -> None:
     inner, bounds = objective_named(problem)
     for limit in (1, 7, 200):
@@ -100,7 +110,9 @@ def test_scipys_flag_decides(method: Any, monkeypatch: pytest.MonkeyPatch) -> No
 
     def failing(*arguments: Any, **options: Any) -> Any:
         result = genuine(*arguments, **options)
-        return SimpleNamespace(x=result.x, nit=result.nit, success=False, message="line search failed")
+        return SimpleNamespace(
+            x=result.x, nit=result.nit, success=False, message="line search failed"
+        )
 
     monkeypatch.setattr(optimize, "minimize", failing)
     stalled = minimize(smooth, BOX, optimizer=replace(search, tolerance=1e-6), budget=Budget(5000))
@@ -124,7 +136,8 @@ def test_the_start_that_found_the_best_decides() -> None:
 
 
 def test_hybrid_joins_histories_by_violation_too() -> None:
-    """The swarm ends infeasible with a low cost; what SLSQP then finds is feasible, dearer, and better."""
+    """The swarm ends infeasible with a low cost; what SLSQP then finds is feasible, dearer, and
+    better."""
 
     @dataclass(frozen=True)
     class Ring:
@@ -139,10 +152,15 @@ def test_hybrid_joins_histories_by_violation_too() -> None:
             return self.evaluate(x[None])
 
     box = [[-2.0, 2.0], [-2.0, 2.0]]
-    found = minimize(Ring(), box, optimizer=Hybrid(swarm=ParticleSwarm(particles=5)), seed=1, budget=Budget(400))
+    found = minimize(
+        Ring(), box, optimizer=Hybrid(swarm=ParticleSwarm(particles=5)), seed=1, budget=Budget(400)
+    )
     h = found.history
-    for (c0, v0), (c1, v1) in zip(zip(h.cost, h.violation, strict=True), zip(h.cost[1:], h.violation[1:], strict=True),
-                                  strict=False):
+    for (c0, v0), (c1, v1) in zip(
+        zip(h.cost, h.violation, strict=True),
+        zip(h.cost[1:], h.violation[1:], strict=True),
+        strict=False,
+    ):
         assert v1 < v0 or (v1 == v0 and c1 < c0) or (v1 <= 1e-9 and c1 < c0) or (v1 <= 1e-9 < v0)
     assert found.search_fun == h.cost[-1]
     assert found.violation <= max(h.violation[-1], 1e-9)
@@ -157,7 +175,9 @@ def test_the_processor_clock_stands_still_while_waiting() -> None:
 
     wall = minimize(slow, BOX, optimizer="pso", budget=Budget(evaluations=100_000, seconds=0.3))
     assert wall.status is Status.SECONDS
-    cpu = minimize(slow, BOX, optimizer="pso", budget=Budget(evaluations=150, seconds=0.3, clock="cpu"))
+    cpu = minimize(
+        slow, BOX, optimizer="pso", budget=Budget(evaluations=150, seconds=0.3, clock="cpu")
+    )
     assert cpu.status is Status.EVALUATIONS
     assert cpu.seconds < 0.25
     with pytest.raises(ArgumentError, match=r"budget\.clock"):
@@ -169,7 +189,11 @@ def test_damaged_files_are_named(tmp_path: Path) -> None:
 
     ParticleSwarm().swarm(BOX, np.random.default_rng(0)).save(tmp_path / "s.npz")
     whole = (tmp_path / "s.npz").read_bytes()
-    for damaged in (whole[: len(whole) // 2], whole[:200] + b"\x00" * 200 + whole[400:], b"PK\x03\x04"):
+    for damaged in (
+        whole[: len(whole) // 2],
+        whole[:200] + b"\x00" * 200 + whole[400:],
+        b"PK\x03\x04",
+    ):
         (tmp_path / "s.npz").write_bytes(damaged)
         with pytest.raises(ArgumentError, match=r"Swarm\.save"):
             Swarm.load(tmp_path / "s.npz")

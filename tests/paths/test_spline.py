@@ -17,8 +17,12 @@ numbers = st.floats(-5, 5)
 
 
 @settings(max_examples=40, deadline=None)
-@given(values=st.lists(numbers, min_size=3, max_size=7), gaps=st.lists(st.floats(0.1, 3), min_size=6, max_size=6),
-       slopes=st.tuples(numbers, numbers), clamped=st.tuples(st.booleans(), st.booleans()))
+@given(
+    values=st.lists(numbers, min_size=3, max_size=7),
+    gaps=st.lists(st.floats(0.1, 3), min_size=6, max_size=6),
+    slopes=st.tuples(numbers, numbers),
+    clamped=st.tuples(st.booleans(), st.booleans()),
+)
 def test_matches_scipy_with_natural_and_clamped_ends(values, gaps, slopes, clamped):
     knots = np.concatenate([[0.0], np.cumsum(gaps)])[: len(values)]
     basis = SplineBasis(tuple(knots), *clamped)
@@ -27,9 +31,13 @@ def test_matches_scipy_with_natural_and_clamped_ends(values, gaps, slopes, clamp
     reference = CubicSpline(knots, values, bc_type=tuple(ends))
     u = np.linspace(knots[0], knots[-1], 50)
     for order in range(3):
-        np.testing.assert_allclose(basis.matrix(u, order) @ control, reference(u, order), atol=1e-9 * 1e3)
+        np.testing.assert_allclose(
+            basis.matrix(u, order) @ control, reference(u, order), atol=1e-9 * 1e3
+        )
     middle = (knots[1:] + knots[:-1]) / 2
-    np.testing.assert_allclose(basis.matrix(middle, 3) @ control, reference(middle, 3), atol=1e-5, rtol=1e-7)
+    np.testing.assert_allclose(
+        basis.matrix(middle, 3) @ control, reference(middle, 3), atol=1e-5, rtol=1e-7
+    )
 
 
 def test_polynomials_are_the_same_spline():
@@ -39,7 +47,9 @@ def test_polynomials_are_the_same_spline():
     u = np.linspace(1, 4, 31)
     i = np.clip(u.astype(int) - 1, 0, 2)
     t = (u - 1 - i)[:, None]
-    np.testing.assert_allclose(sum(cubics[i, k] * t**k for k in range(4)), basis.matrix(u) @ values, atol=1e-13)
+    np.testing.assert_allclose(
+        sum(cubics[i, k] * t**k for k in range(4)), basis.matrix(u) @ values, atol=1e-13
+    )
 
 
 @pytest.mark.parametrize("derivative", [1, 2, 3])
@@ -84,19 +94,33 @@ def test_circle_curvature():
     np.testing.assert_allclose(samples.twist[:, 0], 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("path", [
-    Path.through([[0, 0], [1, 0.5], [1.5, -0.3], [2, 0.7]]),
-    Path.through([[0, 0, 0], [1, 0.5, 0.1], [1.5, -0.3, 0.3], [2, 0.7, 0.2]]),
-    Path.through([[0, 0], [1, 0.5], [1.5, -0.3], [2, 0.7]], heading=[0, -0.4, 0.4, 1.0], turning_length=0.49),
-], ids=["tangent", "tangent 3-D", "own heading"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        Path.through([[0, 0], [1, 0.5], [1.5, -0.3], [2, 0.7]]),
+        Path.through([[0, 0, 0], [1, 0.5, 0.1], [1.5, -0.3, 0.3], [2, 0.7, 0.2]]),
+        Path.through(
+            [[0, 0], [1, 0.5], [1.5, -0.3], [2, 0.7]],
+            heading=[0, -0.4, 0.4, 1.0],
+            turning_length=0.49,
+        ),
+    ],
+    ids=["tangent", "tangent 3-D", "own heading"],
+)
 def test_sample_derivatives_by_finite_differences(path):
     h = 1e-5
     s = np.linspace(0, path.length, 23)[1:-1]
     before, here, after = (sample_path(path, s + d) for d in (-h, 0, h))
-    np.testing.assert_allclose((after.position - before.position) / (2 * h), here.tangent, atol=1e-7)
+    np.testing.assert_allclose(
+        (after.position - before.position) / (2 * h), here.tangent, atol=1e-7
+    )
     np.testing.assert_allclose((after.twist - before.twist) / (2 * h), here.twist_rate, atol=3e-5)
-    velocity = np.column_stack([np.cos(here.yaw) * here.twist[:, 0] - np.sin(here.yaw) * here.twist[:, 1],
-                                np.sin(here.yaw) * here.twist[:, 0] + np.cos(here.yaw) * here.twist[:, 1]])
+    velocity = np.column_stack(
+        [
+            np.cos(here.yaw) * here.twist[:, 0] - np.sin(here.yaw) * here.twist[:, 1],
+            np.sin(here.yaw) * here.twist[:, 0] + np.cos(here.yaw) * here.twist[:, 1],
+        ]
+    )
     level = np.hypot(here.tangent[:, 0], here.tangent[:, 1])
     scale = np.where(np.abs(here.slope) > 0, level, 1.0)[:, None]
     np.testing.assert_allclose(velocity * scale, here.tangent[:, :2], atol=1e-9)
@@ -106,7 +130,9 @@ def test_acceleration_of_a_circle_points_to_its_centre():
     angle = np.linspace(0, np.pi, 60)
     path = Path.through(np.column_stack([np.sin(angle), 1 - np.cos(angle)]))
     samples = sample_path(path, np.linspace(0.5, path.length - 0.5, 9))
-    np.testing.assert_allclose(samples.acceleration_rate[:, 1], 1.0, atol=2e-3)  # v^2/r, to the left
+    np.testing.assert_allclose(
+        samples.acceleration_rate[:, 1], 1.0, atol=2e-3
+    )  # v^2/r, to the left
 
 
 def test_coinciding_points_are_named():
@@ -121,17 +147,23 @@ def test_doubling_back_is_infeasible_and_says_where():
     assert caught.value.place == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize(("points", "what"), [
-    ([[0, 0]], "shape"), ([[0, 0], [np.nan, 1]], "finite"), ([0, 1, 2], "shape"),
-    ([[0, 0, 0, 0], [1, 1, 1, 1]], "shape"),
-])
+@pytest.mark.parametrize(
+    ("points", "what"),
+    [
+        ([[0, 0]], "shape"),
+        ([[0, 0], [np.nan, 1]], "finite"),
+        ([0, 1, 2], "shape"),
+        ([[0, 0, 0, 0], [1, 1, 1, 1]], "shape"),
+    ],
+)
 def test_bad_points(points, what):
     with pytest.raises(ArgumentError, match=what):
         Path.through(points)
 
 
 def test_a_heading_of_its_own_needs_level_ground():
-    """Samples of such a path are planar, so its length would count a climb that its twist does not."""
+    """Samples of such a path are planar, so its length would count a climb that its twist does
+    not."""
     Path.through([[0, 0, 1], [1, 0, 1]], heading=[0, 1])
     with pytest.raises(ArgumentError, match="level ground"):
         Path.through([[0, 0, 0], [1, 0, 1]], heading=[0, 1])

@@ -39,12 +39,16 @@ MOTORS = (Speed(2.1), Acceleration(0.55, 7.8))
 def turn() -> Trajectory:
     """A path on which slip binds most of the way."""
     angle = np.linspace(0, 1.2 * math.pi, 8)
-    points = np.vstack([[-3, 0], [-1.5, 0], np.column_stack([1.5 * np.sin(angle), 1.5 - 1.5 * np.cos(angle)])])
+    points = np.vstack(
+        [[-3, 0], [-1.5, 0], np.column_stack([1.5 * np.sin(angle), 1.5 - 1.5 * np.cos(angle)])]
+    )
     return time_scale(Path.through(points), [*MOTORS, Slip(0.332, per_wheel=True)], robot=ROBOT)
 
 
 def test_weight_and_straight_motion() -> None:
-    plan = time_scale(Path.through([[0, 0], [2, 0]]), [Speed(0.5), Acceleration(0.5, 0.5)], robot=ROBOT)
+    plan = time_scale(
+        Path.through([[0, 0], [2, 0]]), [Speed(0.5), Acceleration(0.5, 0.5)], robot=ROBOT
+    )
     seen = drive_in_pybullet(plan, powerbot_drive(ROBOT), Floor(0.332))
     assert seen.load[-1].sum() == pytest.approx(148 * 9.81, rel=0.01)
     assert seen.load[-1, :2].sum() / seen.load[-1].sum() == pytest.approx(0.218 / 0.35, rel=0.02)
@@ -53,7 +57,10 @@ def test_weight_and_straight_motion() -> None:
 
 
 def test_slip_within_and_beyond_the_limit(turn: Trajectory) -> None:
-    share = sum(part.end - part.start for part in turn.active if part.limit == "slip") / turn.path.length
+    share = (
+        sum(part.end - part.start for part in turn.active if part.limit == "slip")
+        / turn.path.length
+    )
     assert share >= 0.3
     within = drive_in_pybullet(turn, powerbot_drive(ROBOT), Floor(0.332))
     beyond = drive_in_pybullet(turn, powerbot_drive(ROBOT), Floor(0.332), faster=math.sqrt(1.2))
@@ -62,23 +69,30 @@ def test_slip_within_and_beyond_the_limit(turn: Trajectory) -> None:
 
 
 def test_tip_binds_with_grip_and_height() -> None:
-    """Friction 1.2 and a high centre of gravity: braking 3 cm inside the tip limit keeps the casters down (what
-    is left is the pitch of the compliant contacts), 30 % beyond the limit lifts them."""
+    """Friction 1.2 and a high centre of gravity: braking 3 cm inside the tip limit keeps the
+    casters down (what is left is the pitch of the compliant contacts), 30 % beyond the limit lifts
+    them."""
     tall = powerbot(cog_height=0.6, caster_half_track=0.0)
     limits = [Speed(2.0), Acceleration(0.55, 7.8), Slip(1.2, per_wheel=True), Tip(reserve=0.03)]
     plan = time_scale(Path.through([[0, 0], [6, 0]]), limits, robot=tall)
     assert any(part.limit == "tip" for part in plan.active)
     within = drive_in_pybullet(plan, powerbot_drive(tall), Floor(1.2))
-    beyond = drive_in_pybullet(plan, powerbot_drive(tall), Floor(1.2),
-                               faster=math.sqrt(1.3 * 0.132 / (0.132 - 0.03)))
+    beyond = drive_in_pybullet(
+        plan, powerbot_drive(tall), Floor(1.2), faster=math.sqrt(1.3 * 0.132 / (0.132 - 0.03))
+    )
     assert np.abs(within.pitch).max() < math.radians(1.0)
     assert np.abs(beyond.pitch).max() > math.radians(5.0)
 
 
 def test_closed_loop_up_a_ramp() -> None:
     ramp = Ramp((2.0, 0.0), 0.0, 4.266, 0.45, 0.35)
-    path = lay_over(Path.through([[0, 0], [4, 0.2], [8, 0]], start_direction=[1, 0], end_direction=[1, 0]), [ramp])
-    plan = time_scale(path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.7 * 0.332, per_wheel=True)], robot=ROBOT)
+    path = lay_over(
+        Path.through([[0, 0], [4, 0.2], [8, 0]], start_direction=[1, 0], end_direction=[1, 0]),
+        [ramp],
+    )
+    plan = time_scale(
+        path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.7 * 0.332, per_wheel=True)], robot=ROBOT
+    )
     seen = drive_in_pybullet(plan, powerbot_drive(ROBOT), Floor(0.332, (ramp,)), tracker=Tracker())
     assert np.degrees(-seen.pitch).max() == pytest.approx(6.0, abs=0.5)
     assert seen.goal_offset < 0.02
@@ -92,12 +106,15 @@ def test_closed_loop_through_a_door() -> None:
     plan = time_scale(path, [Speed(0.5), Acceleration(0.55, 1.5)], robot=ROBOT)
     walls = (Wall((2.5, 0.45), (2.5, 2.0)), Wall((2.5, -0.45), (2.5, -2.0)))
     off = (0.0, 0.05, math.radians(2.0))
-    seen = drive_in_pybullet(plan, powerbot_drive(ROBOT), Floor(0.332, (), walls), tracker=Tracker(), start_error=off)
+    seen = drive_in_pybullet(
+        plan, powerbot_drive(ROBOT), Floor(0.332, (), walls), tracker=Tracker(), start_error=off
+    )
     assert not seen.touched
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0
-    crash = drive_in_pybullet(plan, powerbot_drive(ROBOT), Floor(0.332, (), walls),
-                              start_error=(0.0, 0.3, 0.0))
+    crash = drive_in_pybullet(
+        plan, powerbot_drive(ROBOT), Floor(0.332, (), walls), start_error=(0.0, 0.3, 0.0)
+    )
     assert crash.touched
 
 
@@ -117,26 +134,41 @@ def assert_safe_and_at_the_goal(seen: DrivenEncounter) -> None:
     assert not seen.contact
     assert run.kept  # the stopping distance, at every instant
     assert run.gap.min() > 0
-    assert seen.off[200:].max() < 0.02  # m, once the start error has gone: inside the planner's allowance
+    assert (
+        seen.off[200:].max() < 0.02
+    )  # m, once the start error has gone: inside the planner's allowance
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.heading_error) < 1.0
     assert seen.slip_ratio < 0.02
 
 
 def test_a_disc_that_crosses_is_let_by() -> None:
-    """In the way of a robot that would be there at the same time; the same disc in front of a blind robot is hit."""
+    """In the way of a robot that would be there at the same time; the same disc in front of a blind
+    robot is hit."""
     path = Path.through([[0, 0], [3, 0]])
     limits = [Speed(0.5), Acceleration(0.55, 1.5), Slip(0.8 * 0.332, per_wheel=True)]
     where = course(time_scale(path, limits, robot=ROBOT), ROBOT)
     visitor = Visitor(appears=1.0, stays=6.0, distance=1.6, aside=-1.6, speed=0.5)
     drive = powerbot_drive(ROBOT)
-    seen = drive_encounter(where, drive, Floor(0.332), Sensor(1.4, 0.1, 0.1, unseen_speed=0.5),
-                           visited_world([visitor], where.outline), longest=20.0,
-                           start_error=(0.0, 0.02, math.radians(1.0)))
+    seen = drive_encounter(
+        where,
+        drive,
+        Floor(0.332),
+        Sensor(1.4, 0.1, 0.1, unseen_speed=0.5),
+        visited_world([visitor], where.outline),
+        longest=20.0,
+        start_error=(0.0, 0.02, math.radians(1.0)),
+    )
     assert_safe_and_at_the_goal(seen)
-    blind = drive_encounter(where, drive, Floor(0.332), Sensor(1.4, 0.1, 0.1), longest=5.0,
-                            world=visited_world([visitor], where.outline), planner=lambda w, s, plan, now, _: (
-                                replan(w, s, plan, now, [])))
+    blind = drive_encounter(
+        where,
+        drive,
+        Floor(0.332),
+        Sensor(1.4, 0.1, 0.1),
+        longest=5.0,
+        world=visited_world([visitor], where.outline),
+        planner=lambda w, s, plan, now, _: replan(w, s, plan, now, []),
+    )
     assert blind.contact
     assert not blind.run.kept
 
@@ -144,20 +176,37 @@ def test_a_disc_that_crosses_is_let_by() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["stand", "leave", "cross"])
 def test_experiment_3_among_its_obstacles(kind: str) -> None:
-    """Both obstacles at the printed times: as printed, leaving the lane on a track, crossing at a walking pace."""
+    """Both obstacles at the printed times: as printed, leaving the lane on a track, crossing at a
+    walking pace."""
     task = problem(3)
     assert [(o.appears, o.clears_after) for o in task.obstacles] == [(9.95, 0.59), (21.2, 2.74)]
-    where = course(time_scale(task.spline, with_friction(task, 0.5), robot=ROBOT), ROBOT,
-                   limits=with_friction(task, 0.8))
-    sensor = {"stand": Sensor(0.6, 0.5, 0.5), "leave": Sensor(0.6, 0.5, 0.5, unseen_speed=0.1),
-              "cross": Sensor(2.5, 0.1, 0.1, unseen_speed=0.8)}[kind]
+    where = course(
+        time_scale(task.spline, with_friction(task, 0.5), robot=ROBOT),
+        ROBOT,
+        limits=with_friction(task, 0.8),
+    )
+    sensor = {
+        "stand": Sensor(0.6, 0.5, 0.5),
+        "leave": Sensor(0.6, 0.5, 0.5, unseen_speed=0.1),
+        "cross": Sensor(2.5, 0.1, 0.1, unseen_speed=0.8),
+    }[kind]
     visitors = {
         "stand": [Visitor(o.appears, o.clears_after, o.distance) for o in task.obstacles],
-        "leave": [Visitor(o.appears, 10.0, o.distance, 0.49 - 0.1 * o.clears_after, 0.1) for o in task.obstacles],
-        "cross": [Visitor(o.appears - 3.0, 8.0, 2.0, -2.9, 0.8) for o in task.obstacles]}[kind]
-    seen = drive_encounter(where, powerbot_drive(ROBOT), Floor(task.friction), sensor,
-                           visited_world(visitors, where.outline), longest=200.0,
-                           start_error=(0.0, 0.02, math.radians(1.0)))
+        "leave": [
+            Visitor(o.appears, 10.0, o.distance, 0.49 - 0.1 * o.clears_after, 0.1)
+            for o in task.obstacles
+        ],
+        "cross": [Visitor(o.appears - 3.0, 8.0, 2.0, -2.9, 0.8) for o in task.obstacles],
+    }[kind]
+    seen = drive_encounter(
+        where,
+        powerbot_drive(ROBOT),
+        Floor(task.friction),
+        sensor,
+        visited_world(visitors, where.outline),
+        longest=200.0,
+        start_error=(0.0, 0.02, math.radians(1.0)),
+    )
     assert_safe_and_at_the_goal(seen)
     near = np.isfinite(seen.run.gap)
     assert near.any()
@@ -172,7 +221,9 @@ def test_experiment_6_along_its_profile(manner: Literal["below", "least_squares"
     profile = task.speed_profile()
     assert profile is not None
     plan = follow(task.spline, profile, with_friction(task, 0.7), robot=ROBOT, manner=manner)
-    seen = drive_in_pybullet(plan.trajectory, powerbot_drive(ROBOT), Floor(task.friction), tracker=Tracker())
+    seen = drive_in_pybullet(
+        plan.trajectory, powerbot_drive(ROBOT), Floor(task.friction), tracker=Tracker()
+    )
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0
     assert seen.speed_error < 0.043  # m/s, what thesis 004 measured on the robot (Table 18)

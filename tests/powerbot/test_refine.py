@@ -52,17 +52,23 @@ def test_jerk_limit_on_a_bend_keeps_slip(straight: Trajectory) -> None:
 
 
 def test_jerk_limit_over_a_ramp_keeps_every_row() -> None:
-    """Slip rows jump at the ramp's rounded edges; rows left out of the program are checked like the others."""
+    """Slip rows jump at the ramp's rounded edges; rows left out of the program are checked like the
+    others."""
     path = Path.through([[0, 0], [4, 0.3], [8, 0]], start_direction=[1, 0], end_direction=[1, 0])
     limits = [Speed(2.1), Acceleration(0.55, 7.8), Slip(0.332), Tip()]
-    fast = time_scale(lay_over(path, [Ramp((2.0, 0.0), 0.0, 4.266, 0.45, 0.35)]), limits, robot=powerbot())
+    fast = time_scale(
+        lay_over(path, [Ramp((2.0, 0.0), 0.0, 4.266, 0.45, 0.35)]), limits, robot=powerbot()
+    )
     motion = limit_jerk(fast, 2.0, nodes=80)
     assert set(motion.margins()) == {"speed", "acceleration", "slip", "tip"}
     assert min(motion.margins().values()) >= -1e-9
     assert motion.slowdown < 1.01
     assert fast.duration < motion.duration < 1.15 * fast.duration
     steps = np.diff(motion.times)
-    for values, rates, then in ((motion.a, motion.jerk, 0.0), (motion.v, motion.a[:-1], motion.jerk * steps / 2)):
+    for values, rates, then in (
+        (motion.a, motion.jerk, 0.0),
+        (motion.v, motion.a[:-1], motion.jerk * steps / 2),
+    ):
         np.testing.assert_allclose(np.diff(values), steps * (rates + then), atol=1e-6)
 
 
@@ -89,7 +95,14 @@ def test_following_what_is_feasible_is_exact() -> None:
     places = np.linspace(0, 6, 61)
     profile = SpeedProfile(tuple(places), tuple(0.5 + 0.1 * np.sin(places)))
     for manner in ("below", "least_squares"):
-        found = follow(path, profile, LIMITS, start_speed=0.5, end_speed=float(profile.speeds[-1]), manner=manner)
+        found = follow(
+            path,
+            profile,
+            LIMITS,
+            start_speed=0.5,
+            end_speed=float(profile.speeds[-1]),
+            manner=manner,
+        )
         assert found.largest_error < 2e-3
         assert min(found.trajectory.margins().values()) >= -1e-9
 
@@ -100,13 +113,16 @@ def test_least_squares_is_closer_than_below() -> None:
     errors = {}
     for manner in ("below", "least_squares"):
         found = follow(path, profile, (Speed(1.0), Acceleration(0.3, 0.3)), manner=manner)
-        errors[manner] = np.trapezoid((found.trajectory.sd**2 - found.wanted**2) ** 2, found.trajectory.s)
+        errors[manner] = np.trapezoid(
+            (found.trajectory.sd**2 - found.wanted**2) ** 2, found.trajectory.s
+        )
     assert errors["least_squares"] < errors["below"]
     assert math.isfinite(errors["below"])
 
 
 def test_programs_do_not_depend_on_casadis_global_numpy_switch() -> None:
-    """Users may switch CasADi's NumPy mode on for their own models: ours must read and leave it as it was."""
+    """Users may switch CasADi's NumPy mode on for their own models: ours must read and leave it as
+    it was."""
     path = Path.through([[0, 0], [6, 0]])
     profile = SpeedProfile((0.0, 6.0), (0.9, 0.4))
     limits = (Speed(1.0), Acceleration(0.3, 0.3))

@@ -30,15 +30,18 @@ def exact() -> Solution:
 
 @pytest.fixture(scope="session")
 def through_actuators() -> Solution:
-    """A short swarm search through the actuators: nominal timing, limits broken, misses the goal."""
+    """A short swarm search through the actuators: nominal timing, limits broken, misses the
+    goal."""
     problem = problem_file("scenario_2_forward45").replace(
-        {"actuator.enabled": True, "spline.free": ["p1", "p2", "heading"]})
+        {"actuator.enabled": True, "spline.free": ["p1", "p2", "heading"]}
+    )
     return trajopt.solve(problem, optimizer="pso", seed=3, budget=trajopt.Budget(evaluations=500))
 
 
 @pytest.fixture(scope="session")
 def violated() -> Solution:
-    """Duration as the cost, too few evaluations to meet the wheel angles: infeasible with a trajectory."""
+    """Duration as the cost, too few evaluations to meet the wheel angles: infeasible with a
+    trajectory."""
     problem = problem_file("scenario_1_forward45").replace({"objective.kind": "duration"})
     return trajopt.solve(problem, optimizer="pso", seed=0, budget=trajopt.Budget(evaluations=60))
 
@@ -54,7 +57,8 @@ def without_motion(exact: Solution) -> Solution:
 
 @pytest.fixture(scope="session")
 def drifted(exact: Solution) -> ValidationReport:
-    """A made-up simulation that drifts from the plan by 1 mm a second along x and lags 2 mrad in wheel angle."""
+    """A made-up simulation that drifts from the plan by 1 mm a second along x and lags 2 mrad in
+    wheel angle."""
     trajectory = exact.trajectory
     assert trajectory is not None
     times = np.linspace(0.0, trajectory.duration + 0.2, 300)
@@ -63,7 +67,24 @@ def drifted(exact: Solution) -> ValidationReport:
     flat, four = np.zeros(len(times)), np.zeros((len(times), 4))
     picture = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
     recording = Recording(
-        "made-up", "0.0", times, pose, flat, flat, flat, plan.wheel_angles - 2e-3, plan.wheel_speeds, four, four,
-        np.full(len(times), 4), False, "", 1.25, 3.5, picture)
-    return ValidationReport("made-up", 2e-3, -1e-3, 5e-4, np.full(4, -2e-3), 1e-3, 4e-3, 3.0, 3.5, plan.pose,
-                            recording)
+        "made-up",
+        "0.0",
+        times,
+        pose,
+        flat,
+        flat,
+        flat,
+        plan.wheel_angles - 2e-3,
+        plan.wheel_speeds,
+        four,
+        four,
+        np.full(len(times), 4),
+        False,
+        "",
+        1.25,
+        3.5,
+        picture,
+    )
+    return ValidationReport(
+        "made-up", 2e-3, -1e-3, 5e-4, np.full(4, -2e-3), 1e-3, 4e-3, 3.0, 3.5, plan.pose, recording
+    )

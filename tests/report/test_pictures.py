@@ -1,4 +1,5 @@
-"""Pictures are drawn for every kind of result, show something, and keep matplotlib's settings as they were."""
+"""Pictures are drawn for every kind of result, show something, and keep matplotlib's settings as
+they were."""
 
 from __future__ import annotations
 
@@ -25,23 +26,31 @@ def assert_shows_something(file: Path) -> None:
     pixels = np.asarray(imread(file))[..., :3]
     assert min(pixels.shape[:2]) > 300
     assert pixels.std() > 0.04  # a blank page has 0
-    border = np.concatenate([pixels[:4].ravel(), pixels[-4:].ravel(), pixels[:, :4].ravel(), pixels[:, -4:].ravel()])
+    border = np.concatenate(
+        [pixels[:4].ravel(), pixels[-4:].ravel(), pixels[:, :4].ravel(), pixels[:, -4:].ravel()]
+    )
     assert border.min() > 0.99  # nothing is cut off at the edge
 
 
 @pytest.mark.parametrize("name", ["exact", "through_actuators", "violated", "without_motion"])
-def test_every_kind_of_result_has_its_pictures(name: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+def test_every_kind_of_result_has_its_pictures(
+    name: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
     solution: Solution = request.getfixturevalue(name)
     before = dict(mpl.rcParams)
     files = save_pictures(solution, tmp_path)
-    expected = {"path.png", "convergence.png"} | ({"profile.png"} if solution.trajectory is not None else set())
+    expected = {"path.png", "convergence.png"} | (
+        {"profile.png"} if solution.trajectory is not None else set()
+    )
     assert {file.name for file in files} == expected == {file.name for file in tmp_path.iterdir()}
     for file in files:
         assert_shows_something(file)
     assert dict(mpl.rcParams) == before
 
 
-def test_physics_and_engine_pictures(exact: Solution, drifted: ValidationReport, tmp_path: Path) -> None:
+def test_physics_and_engine_pictures(
+    exact: Solution, drifted: ValidationReport, tmp_path: Path
+) -> None:
     files = save_physics_picture(exact, drifted, tmp_path)
     assert [file.name for file in files] == ["physics.png", "engine.png"]
     assert_shows_something(files[0])
@@ -49,28 +58,52 @@ def test_physics_and_engine_pictures(exact: Solution, drifted: ValidationReport,
     np.testing.assert_array_equal(shown, drifted.recording.picture)
 
 
-def test_without_an_engine_picture_there_is_none(exact: Solution, drifted: ValidationReport, tmp_path: Path) -> None:
+def test_without_an_engine_picture_there_is_none(
+    exact: Solution, drifted: ValidationReport, tmp_path: Path
+) -> None:
     plain = replace(drifted, recording=replace(drifted.recording, picture=None))
     assert [file.name for file in save_physics_picture(exact, plain, tmp_path)] == ["physics.png"]
 
 
-def test_physics_picture_needs_a_trajectory(without_motion: Solution, drifted: ValidationReport,
-                                            tmp_path: Path) -> None:
+def test_physics_picture_needs_a_trajectory(
+    without_motion: Solution, drifted: ValidationReport, tmp_path: Path
+) -> None:
     with pytest.raises(ArgumentError, match="trajectory"):
         save_physics_picture(without_motion, drifted, tmp_path)
 
 
-@pytest.mark.parametrize(("cost", "violation"), [
-    ([], []), ([1e-15], [0.0]), ([0.0], [0.0]), ([2.0, 1.9], [0.0, 0.0]), ([3.0, 1e-9], [0.0, 0.0]),
-    ([5.0, 7.0], [0.4, 0.0]), ([5.0, 4.0], [0.4, 0.2]), ([np.inf, 1.0], [np.inf, 0.0])])
-def test_convergence_of_any_history(cost: list[float], violation: list[float], exact: Solution,
-                                    tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("cost", "violation"),
+    [
+        ([], []),
+        ([1e-15], [0.0]),
+        ([0.0], [0.0]),
+        ([2.0, 1.9], [0.0, 0.0]),
+        ([3.0, 1e-9], [0.0, 0.0]),
+        ([5.0, 7.0], [0.4, 0.0]),
+        ([5.0, 4.0], [0.4, 0.2]),
+        ([np.inf, 1.0], [np.inf, 0.0]),
+    ],
+)
+def test_convergence_of_any_history(
+    cost: list[float], violation: list[float], exact: Solution, tmp_path: Path
+) -> None:
     n = len(cost)
-    history = History(np.arange(1, n + 1) * 3, np.linspace(0, 1, n), np.array(cost), np.array(violation),
-                      np.zeros((0, 2)))
-    search = replace(exact.search, history=history, nfev=max(3 * n, 1), fun=cost[-1] if n else np.inf,
-                     violation=violation[-1] if n else np.inf,
-                     status=Status.CONVERGED if n else Status.FAILED)
+    history = History(
+        np.arange(1, n + 1) * 3,
+        np.linspace(0, 1, n),
+        np.array(cost),
+        np.array(violation),
+        np.zeros((0, 2)),
+    )
+    search = replace(
+        exact.search,
+        history=history,
+        nfev=max(3 * n, 1),
+        fun=cost[-1] if n else np.inf,
+        violation=violation[-1] if n else np.inf,
+        status=Status.CONVERGED if n else Status.FAILED,
+    )
     solution = replace(exact, search=search)
     file = tmp_path / "convergence.png"
     figure = convergence_figure(solution)
@@ -86,16 +119,21 @@ def test_bands_are_the_active_stretches(exact: Solution) -> None:
     assert [name for *_, name in bands] == [part.limit for part in trajectory.active]
     assert all(0.0 <= first < last <= trajectory.duration for first, last, _ in bands)
     for (first, last, _), part in zip(bands, trajectory.active, strict=True):
-        np.testing.assert_allclose(trajectory.along([first, last])[0], [part.start, part.end], atol=1e-9)
+        np.testing.assert_allclose(
+            trajectory.along([first, last])[0], [part.start, part.end], atol=1e-9
+        )
 
 
 @pytest.mark.parametrize("name", ["exact", "through_actuators"])
 def test_use_of_limits_is_one_minus_the_margin(name: str, request: pytest.FixtureRequest) -> None:
     trajectory = request.getfixturevalue(name).trajectory
     times, used = limit_use(trajectory)
-    assert np.all((times[1:-1] >= trajectory.times[:-1, None]) & (times[1:-1] <= trajectory.times[1:, None]))
+    assert np.all(
+        (times[1:-1] >= trajectory.times[:-1, None]) & (times[1:-1] <= trajectory.times[1:, None])
+    )
     for k, (limit, margin) in enumerate(trajectory.margins().items()):
-        # Margins come from a finer grid; a knot or a peak between the three places read may add a little.
+        # Margins come from a finer grid; a knot or a peak between the three places read may add a
+        # little.
         assert used[:, k].max() == pytest.approx(1 - margin, rel=0.02), limit
         assert used[:, k].max() <= 1 - margin + 1e-6
 
@@ -110,7 +148,9 @@ def test_obstacle_touches_the_robot_at_the_goal(exact: Solution) -> None:
     found = obstacle_strip(exact.problem, loc8(), 1.2)
     assert found is not None
     strip, yaw = found
-    assert yaw == exact.problem.start.pose[2]  # the scenarios meet a step across their start heading
+    assert (
+        yaw == exact.problem.start.pose[2]
+    )  # the scenarios meet a step across their start heading
     reach = outline(loc8(), np.asarray(exact.problem.goal.pose))[:, 0].max()
     assert strip[:, 0].min() == pytest.approx(reach)
     flat = exact.problem.replace({"scene.obstacle_height": 0.0})
@@ -118,4 +158,6 @@ def test_obstacle_touches_the_robot_at_the_goal(exact: Solution) -> None:
     behind = exact.problem.replace({"start.pose": [0.0, 0.0, 3.0]})
     meets = obstacle_strip(behind, loc8(), 1.2)
     assert meets is not None
-    assert meets[1] == pytest.approx(exact.problem.goal.pose[2] + np.pi / 2)  # left wheels lead: leftwards
+    assert meets[1] == pytest.approx(
+        exact.problem.goal.pose[2] + np.pi / 2
+    )  # left wheels lead: leftwards

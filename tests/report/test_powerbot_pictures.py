@@ -33,7 +33,9 @@ def test_exponent_of_a_power(power: float) -> None:
 
 
 @pytest.mark.parametrize(("points", "seconds"), [((1,), (1,)), ((1, 2), (1,)), ((1, 2), (0, 1))])
-def test_exponent_needs_pairs_of_positive_numbers(points: tuple[float, ...], seconds: tuple[float, ...]) -> None:
+def test_exponent_needs_pairs_of_positive_numbers(
+    points: tuple[float, ...], seconds: tuple[float, ...]
+) -> None:
     with pytest.raises(ArgumentError):
         growth_exponent(points, seconds)
 
@@ -46,11 +48,20 @@ def test_pictures_show_something(tmp_path: FilePath) -> None:
     free = run_encounter(where, sensor, lambda *_: [], longest=20.0)
     block = Obstacle((2.0, 0.3), 0.2)
     run = run_encounter(where, sensor, lambda t, _: [block] if t < 5 else [], longest=20.0)
-    files = [draw_growth({"ours": (POINTS, [1e-3, 1e-2, 1e-1]), "theirs": (POINTS[:2], [1e-2, 1e-1])},
-                         tmp_path / "growth.png"),
-             draw_path(plan, tmp_path / "path.png", knots=[[0, 0], [2, 0.3], [4, 0]]),
-             draw_profiles([("slow", time_scale(path, [Speed(0.4)], robot=robot, engine="linear")), ("fast", plan)],
-                           tmp_path / "profiles.png"),
-             draw_safe_speed(tmp_path / "safe.png", braking=1.5, robot_speed=2.1),
-             draw_replan(run, where, tmp_path / "replan.png", free=free)]
+    files = [
+        draw_growth(
+            {"ours": (POINTS, [1e-3, 1e-2, 1e-1]), "theirs": (POINTS[:2], [1e-2, 1e-1])},
+            tmp_path / "growth.png",
+        ),
+        draw_path(plan, tmp_path / "path.png", knots=[[0, 0], [2, 0.3], [4, 0]]),
+        draw_profiles(
+            [
+                ("slow", time_scale(path, [Speed(0.4)], robot=robot, engine="linear")),
+                ("fast", plan),
+            ],
+            tmp_path / "profiles.png",
+        ),
+        draw_safe_speed(tmp_path / "safe.png", braking=1.5, robot_speed=2.1),
+        draw_replan(run, where, tmp_path / "replan.png", free=free),
+    ]
     assert all(shows_something(file) for file in files)

@@ -49,18 +49,29 @@ def summary_of(folder: Path) -> dict[str, Any]:
 
 
 def test_read_solution_gives_back_what_was_written(solution: Solution, tmp_path: Path) -> None:
-    back = read_solution(write_solution(solution, tmp_path / "run", seed=7, command="trajopt solve x"))
+    back = read_solution(
+        write_solution(solution, tmp_path / "run", seed=7, command="trajopt solve x")
+    )
     assert back.problem.model_dump() == solution.problem.model_dump()
     np.testing.assert_array_equal(back.search.x, solution.search.x)
     np.testing.assert_array_equal(back.control_points, solution.control_points)
     for name in ("evaluations", "seconds", "cost", "violation", "samples"):
-        np.testing.assert_array_equal(getattr(back.search.history, name), getattr(solution.search.history, name))
+        np.testing.assert_array_equal(
+            getattr(back.search.history, name), getattr(solution.search.history, name)
+        )
     for name in ("deviation", "wheel_deviation", "dead_zone_effect"):
         np.testing.assert_array_equal(getattr(back, name), getattr(solution, name))
     assert back.terms == solution.terms
     assert (back.cost, back.evaluations, back.search.status) == (
-        solution.cost, solution.evaluations, solution.search.status)
-    assert (back.holds, back.faults, back.status) == (solution.holds, solution.faults, solution.status)
+        solution.cost,
+        solution.evaluations,
+        solution.search.status,
+    )
+    assert (back.holds, back.faults, back.status) == (
+        solution.holds,
+        solution.faults,
+        solution.status,
+    )
 
 
 def test_trajectory_is_rebuilt_to_the_last_bit(exact: Solution, tmp_path: Path) -> None:
@@ -71,7 +82,9 @@ def test_trajectory_is_rebuilt_to_the_last_bit(exact: Solution, tmp_path: Path) 
     assert dict(back.margins()) == dict(exact.trajectory.margins())
     times = np.linspace(0.0, back.duration, 50)
     for name in ("pose", "twist", "wheel_angles", "wheel_speeds"):
-        np.testing.assert_array_equal(getattr(back.at(times), name), getattr(exact.trajectory.at(times), name))
+        np.testing.assert_array_equal(
+            getattr(back.at(times), name), getattr(exact.trajectory.at(times), name)
+        )
 
 
 def test_a_summary_is_the_same_after_reading_back(solution: Solution, tmp_path: Path) -> None:
@@ -81,12 +94,18 @@ def test_a_summary_is_the_same_after_reading_back(solution: Solution, tmp_path: 
 
 @pytest.mark.parametrize("optimizer", sorted(optimizer_names()))
 def test_equal_seeds_give_equal_summaries(optimizer: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trajopt.report.run_folder.commit", lambda: "somebody may commit while the test runs")
+    monkeypatch.setattr(
+        "trajopt.report.run_folder.commit", lambda: "somebody may commit while the test runs"
+    )
     texts = []
     for _ in range(2):
         try:
-            found = trajopt.solve(problem_file("scenario_2_lateral"), optimizer=optimizer, seed=5,
-                                  budget=trajopt.Budget(evaluations=200))
+            found = trajopt.solve(
+                problem_file("scenario_2_lateral"),
+                optimizer=optimizer,
+                seed=5,
+                budget=trajopt.Budget(evaluations=200),
+            )
         except MissingDependencyError as error:
             pytest.skip(str(error))
         texts.append(json.dumps(finite(solution_summary(found, seed=5))))
@@ -94,17 +113,33 @@ def test_equal_seeds_give_equal_summaries(optimizer: str, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("optimizer", ["lattice", "pso"])
-def test_equal_seeds_give_equal_bytes_but_for_the_run(optimizer: str, tmp_path: Path,
-                                                      monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("trajopt.report.run_folder.commit", lambda: "somebody may commit while the test runs")
+def test_equal_seeds_give_equal_bytes_but_for_the_run(
+    optimizer: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "trajopt.report.run_folder.commit", lambda: "somebody may commit while the test runs"
+    )
     texts = []
     for attempt in ("first", "second"):
-        found = trajopt.solve(problem_file("scenario_2_lateral"), optimizer=optimizer, seed=5,
-                              budget=trajopt.Budget(evaluations=300))
+        found = trajopt.solve(
+            problem_file("scenario_2_lateral"),
+            optimizer=optimizer,
+            seed=5,
+            budget=trajopt.Budget(evaluations=300),
+        )
         write_solution(found, tmp_path / attempt, seed=5, command=attempt)
         summary = summary_of(tmp_path / attempt)
-        assert set(summary.pop("run")) == {"written", "host", "system", "processor", "command", "folder",
-                                           "problem_file", "wall_time_s", "search_time_s"}
+        assert set(summary.pop("run")) == {
+            "written",
+            "host",
+            "system",
+            "processor",
+            "command",
+            "folder",
+            "problem_file",
+            "wall_time_s",
+            "search_time_s",
+        }
         text = (tmp_path / attempt / "summary.json").read_text(encoding="utf-8")
         texts.append(text[: text.index('"run": {')])
         assert json.loads(texts[-1].rstrip().rstrip(",") + "}") == summary  # run is the last key
@@ -116,8 +151,12 @@ def test_equal_seeds_give_equal_bytes_but_for_the_run(optimizer: str, tmp_path: 
 def test_other_seeds_give_other_bytes(tmp_path: Path) -> None:
     costs = []
     for seed in (1, 2):
-        found = trajopt.solve(problem_file("scenario_2_lateral"), optimizer="pso", seed=seed,
-                              budget=trajopt.Budget(evaluations=300))
+        found = trajopt.solve(
+            problem_file("scenario_2_lateral"),
+            optimizer="pso",
+            seed=seed,
+            budget=trajopt.Budget(evaluations=300),
+        )
         costs.append(summary_of(write_solution(found, tmp_path / str(seed), seed=seed))["cost"])
     assert costs[0] != costs[1]
 
@@ -126,9 +165,20 @@ def test_columns_of_the_trajectory_have_units(exact: Solution, tmp_path: Path) -
     table = pd.read_csv(write_solution(exact, tmp_path, seed=0) / "trajectory.csv")
     corners = [name.replace("-", "_") for name in WHEELS]
     assert list(table.columns) == [
-        "t_s", "x_m", "y_m", "yaw_rad", "vx_m_s", "vy_m_s", "yaw_rate_rad_s",
-        *(f"wheel_{corner}_angle_rad" for corner in corners), *(f"wheel_{corner}_speed_rad_s" for corner in corners),
-        "s_m", "s_dot_m_s", "s_ddot_m_s2", "limit"]
+        "t_s",
+        "x_m",
+        "y_m",
+        "yaw_rad",
+        "vx_m_s",
+        "vy_m_s",
+        "yaw_rate_rad_s",
+        *(f"wheel_{corner}_angle_rad" for corner in corners),
+        *(f"wheel_{corner}_speed_rad_s" for corner in corners),
+        "s_m",
+        "s_dot_m_s",
+        "s_ddot_m_s2",
+        "limit",
+    ]
     assert not table.drop(columns="limit").isna().to_numpy().any()
     steps = np.diff(table["t_s"])
     assert steps.max() <= 0.01 + 1e-12
@@ -137,14 +187,18 @@ def test_columns_of_the_trajectory_have_units(exact: Solution, tmp_path: Path) -
 
 
 def test_trajectory_table_agrees_with_itself(exact: Solution) -> None:
-    """Speeds integrate to positions and wheel angles; the start is the problem's, the end is the goal's."""
+    """Speeds integrate to positions and wheel angles; the start is the problem's, the end is the
+    goal's."""
     start_wheels = (0.3, -0.2, 0.1, 0.0)
     shifted = replace(exact, problem=exact.problem.replace({"start.wheels": list(start_wheels)}))
     table = trajectory_table(shifted)
     time = table["t_s"].to_numpy()
     for i, name in enumerate(WHEELS):
         corner = name.replace("-", "_")
-        angle, speed = table[f"wheel_{corner}_angle_rad"].to_numpy(), table[f"wheel_{corner}_speed_rad_s"].to_numpy()
+        angle, speed = (
+            table[f"wheel_{corner}_angle_rad"].to_numpy(),
+            table[f"wheel_{corner}_speed_rad_s"].to_numpy(),
+        )
         assert angle[0] == pytest.approx(start_wheels[i], abs=1e-12)
         assert angle[-1] - angle[0] == pytest.approx(np.trapezoid(speed, time), abs=2e-3)
     yaw, vx, vy = (table[name].to_numpy() for name in ("yaw_rad", "vx_m_s", "vy_m_s"))
@@ -156,7 +210,9 @@ def test_trajectory_table_agrees_with_itself(exact: Solution) -> None:
 def test_binding_limits_share_the_time(exact: Solution) -> None:
     assert exact.trajectory is not None
     shares = binding_shares(exact.trajectory)
-    assert 0.9 < sum(shares.values()) <= 1.0 + 1e-12  # a time-optimal motion: something binds nearly always
+    assert (
+        0.9 < sum(shares.values()) <= 1.0 + 1e-12
+    )  # a time-optimal motion: something binds nearly always
     assert list(shares.values()) == sorted(shares.values(), reverse=True)
     assert set(binding_at(exact.trajectory, np.linspace(0, exact.duration, 200))) <= {*shares, ""}
 
@@ -164,7 +220,11 @@ def test_binding_limits_share_the_time(exact: Solution) -> None:
 def test_summary_names_what_fails(without_motion: Solution, violated: Solution) -> None:
     summary = solution_summary(without_motion, seed=0)
     assert summary["holds"] is False
-    assert summary["infeasible"] == {"limit": "tip", "place_m": 0.25, "reason": "rest already breaks it"}
+    assert summary["infeasible"] == {
+        "limit": "tip",
+        "place_m": 0.25,
+        "reason": "rest already breaks it",
+    }
     assert summary["timing"] is None
     assert any("tip" in fault for fault in summary["faults"])
     assert solution_summary(violated, seed=0)["search"]["status"] == "INFEASIBLE"
@@ -172,15 +232,18 @@ def test_summary_names_what_fails(without_motion: Solution, violated: Solution) 
 
 
 def test_summary_has_no_number_that_json_lacks(without_motion: Solution, tmp_path: Path) -> None:
-    text = (write_solution(without_motion, tmp_path, seed=0) / "summary.json").read_text(encoding="utf-8")
+    text = (write_solution(without_motion, tmp_path, seed=0) / "summary.json").read_text(
+        encoding="utf-8"
+    )
     assert "NaN" not in text
     assert "Infinity" not in text
     assert json.loads(text)["duration_s"] is None
     assert not (tmp_path / "trajectory.csv").exists()
 
 
-def test_an_earlier_run_leaves_nothing_behind(exact: Solution, without_motion: Solution, drifted: ValidationReport,
-                                              tmp_path: Path) -> None:
+def test_an_earlier_run_leaves_nothing_behind(
+    exact: Solution, without_motion: Solution, drifted: ValidationReport, tmp_path: Path
+) -> None:
     write_solution(exact, tmp_path, seed=0)
     write_validation(drifted, tmp_path)
     (tmp_path / "notes.txt").write_text("mine")
@@ -190,7 +253,9 @@ def test_an_earlier_run_leaves_nothing_behind(exact: Solution, without_motion: S
 
 
 def test_validation_round_trip(drifted: ValidationReport, tmp_path: Path) -> None:
-    content = json.loads((write_validation(drifted, tmp_path) / "validation.json").read_text(encoding="utf-8"))
+    content = json.loads(
+        (write_validation(drifted, tmp_path) / "validation.json").read_text(encoding="utf-8")
+    )
     assert content["along_m"] == drifted.along
     assert content["along_share"] == pytest.approx(drifted.along / drifted.length)
     assert content["final_distance_m"] == pytest.approx(np.hypot(2e-3, 1e-3))
@@ -201,19 +266,32 @@ def test_validation_round_trip(drifted: ValidationReport, tmp_path: Path) -> Non
 
 
 def test_written_problem_loads_again(exact: Solution, tmp_path: Path) -> None:
-    problem = exact.problem.replace({"title": 'quotes " and \\ and ü', "goal.wheels": [1e-7, 2.5, -3.0, 1e6]})
+    problem = exact.problem.replace(
+        {"title": 'quotes " and \\ and ü', "goal.wheels": [1e-7, 2.5, -3.0, 1e6]}
+    )
     write_solution(replace(exact, problem=problem), tmp_path, seed=0)
     assert trajopt.load_problem(tmp_path / "problem.toml").model_dump() == problem.model_dump()
 
 
-_SCALARS = st.one_of(st.booleans(), st.integers(-2**60, 2**60), st.floats(allow_nan=False, allow_infinity=False),
-                     st.text(st.characters(exclude_categories=["Cs"]), max_size=12))
+_SCALARS = st.one_of(
+    st.booleans(),
+    st.integers(-(2**60), 2**60),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.text(st.characters(exclude_categories=["Cs"]), max_size=12),
+)
 _TABLES = st.recursive(
-    st.dictionaries(st.text(st.characters(exclude_categories=["Cs"]), max_size=6),
-                    st.one_of(_SCALARS, st.lists(_SCALARS, max_size=4)), max_size=4),
-    lambda inner: st.dictionaries(st.text("abc-_.", max_size=6),
-                                  st.one_of(_SCALARS, inner, st.lists(inner, max_size=3)), max_size=4),
-    max_leaves=8)
+    st.dictionaries(
+        st.text(st.characters(exclude_categories=["Cs"]), max_size=6),
+        st.one_of(_SCALARS, st.lists(_SCALARS, max_size=4)),
+        max_size=4,
+    ),
+    lambda inner: st.dictionaries(
+        st.text("abc-_.", max_size=6),
+        st.one_of(_SCALARS, inner, st.lists(inner, max_size=3)),
+        max_size=4,
+    ),
+    max_leaves=8,
+)
 
 
 @settings(max_examples=200, deadline=None)
@@ -222,7 +300,9 @@ def test_toml_text_says_what_it_was_given(table: dict[str, Any]) -> None:
     assert tomllib.loads(as_toml(table)) == table
 
 
-@pytest.mark.parametrize("damage", ["no summary", "no timing", "other format", "missing key", "no json", "bad toml"])
+@pytest.mark.parametrize(
+    "damage", ["no summary", "no timing", "other format", "missing key", "no json", "bad toml"]
+)
 def test_damaged_folders_are_refused_in_words(damage: str, exact: Solution, tmp_path: Path) -> None:
     folder = write_solution(exact, tmp_path / "run", seed=0)
     summary = summary_of(folder)
@@ -235,8 +315,11 @@ def test_damaged_folders_are_refused_in_words(damage: str, exact: Solution, tmp_
     elif damage == "no json":
         (folder / "summary.json").write_text("{")
     else:
-        changed = {**summary, "format": 99} if damage == "other format" else {
-            k: v for k, v in summary.items() if k != "terms"}
+        changed = (
+            {**summary, "format": 99}
+            if damage == "other format"
+            else {k: v for k, v in summary.items() if k != "terms"}
+        )
         (folder / "summary.json").write_text(json.dumps(changed))
     with pytest.raises((ArgumentError, ProblemError), match="expected"):
         read_solution(folder)
@@ -262,5 +345,7 @@ def test_provenance_names_versions_and_commit() -> None:
 
 def test_a_saved_solution_starts_another_search(exact: Solution, tmp_path: Path) -> None:
     x0 = read_solution(write_solution(exact, tmp_path, seed=0)).search.x
-    again = trajopt.solve(exact.problem, optimizer="nelder-mead", x0=x0, budget=trajopt.Budget(evaluations=40))
+    again = trajopt.solve(
+        exact.problem, optimizer="nelder-mead", x0=x0, budget=trajopt.Budget(evaluations=40)
+    )
     assert again.cost <= exact.cost + 1e-6

@@ -29,9 +29,17 @@ def test_a_solution_that_holds(exact: Solution) -> None:
     assert max(map(len, text.splitlines())) <= 100
 
 
-@pytest.mark.parametrize(("name", "says"), [
-    ("through_actuators", "broken by"), ("violated", "violation"), ("without_motion", "limit 'tip' at s = 0.25")])
-def test_a_solution_that_does_not_hold(name: str, says: str, request: pytest.FixtureRequest) -> None:
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("through_actuators", "broken by"),
+        ("violated", "violation"),
+        ("without_motion", "limit 'tip' at s = 0.25"),
+    ],
+)
+def test_a_solution_that_does_not_hold(
+    name: str, says: str, request: pytest.FixtureRequest
+) -> None:
     text = text_of(solution_table(request.getfixturevalue(name)))
     assert "does not hold" in text
     assert says in text

@@ -24,7 +24,9 @@ def test_printed_inverse_is_ours_with_y_mirrored():
 
 def test_printed_forward_is_ours_with_y_mirrored():
     # R/4 [[1,1,1,1],[1,-1,-1,1],[-1/L,1/L,-1/L,1/L]]; the scan garbles it, SOURCES restores it.
-    printed = WHEEL_RADIUS / 4 * np.array([[1, 1, 1, 1], [1, -1, -1, 1], [-1 / L, 1 / L, -1 / L, 1 / L]])
+    printed = (
+        WHEEL_RADIUS / 4 * np.array([[1, 1, 1, 1], [1, -1, -1, 1], [-1 / L, 1 / L, -1 / L, 1 / L]])
+    )
     np.testing.assert_allclose(MIRROR @ loc8().forward, printed, atol=1e-12)
 
 
@@ -38,7 +40,9 @@ def test_heading_identity_of_table_5_5():
     assert np.dot([-1, 1, -1, 1], wheels) == pytest.approx(4 * 7.060 * 0.7, rel=1e-3)
 
 
-@given(st.floats(0.01, 1), st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3), st.floats(-1.2, 1.2))
+@given(
+    st.floats(0.01, 1), st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3), st.floats(-1.2, 1.2)
+)
 def test_swedish_rows_hold_for_a_rolling_wheel(radius, vx, vy, wz, gamma):
     """Contact point velocity along the roller axis is zero; across it the roller turns."""
     wheel = Wheel(WheelKind.SWEDISH, 0.5, 0.6, 0.3, radius, gamma=gamma)
@@ -54,9 +58,15 @@ def test_swedish_rows_hold_for_a_rolling_wheel(radius, vx, vy, wz, gamma):
     assert slip @ [np.cos(turn), np.sin(turn)] == pytest.approx(free, abs=1e-9)
 
 
-@pytest.mark.parametrize("arguments", [
-    {"radius": 0.0}, {"radius": float("nan")}, {"l": -1.0}, {"gamma": np.pi / 2},
-])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"radius": 0.0},
+        {"radius": float("nan")},
+        {"l": -1.0},
+        {"gamma": np.pi / 2},
+    ],
+)
 def test_impossible_wheels_are_rejected(arguments):
     good = {"kind": WheelKind.SWEDISH, "l": 0.5, "alpha": 0.0, "beta": 0.0, "radius": 0.1}
     with pytest.raises(ArgumentError, match=next(iter(arguments))):
@@ -88,7 +98,9 @@ def test_ideal_actuator_changes_nothing():
     assert Actuator().step_mean(3.3, 1.0) == 3.3
 
 
-@pytest.mark.parametrize(("saturation", "dead_zone"), [(1.0, 2.0), (10.0, -1.0), (float("nan"), 0.0)])
+@pytest.mark.parametrize(
+    ("saturation", "dead_zone"), [(1.0, 2.0), (10.0, -1.0), (float("nan"), 0.0)]
+)
 def test_bad_actuators(saturation, dead_zone):
     with pytest.raises(ArgumentError, match="actuator"):
         Actuator(saturation, dead_zone)

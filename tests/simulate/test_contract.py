@@ -52,7 +52,10 @@ def test_ramp_starts_on_the_ground_at_its_foot_and_rises() -> None:
 def test_wheel_speeds_are_those_of_the_printed_matrix(mecanum_robot: SimRobot) -> None:
     # SMDW thesis, section 1.4, in right-handed axes: FL = vx - vy - L wz, ... over R
     vx, vy, wz, arm, radius = 0.4, -0.7, 0.9, 0.376 + 0.316, 0.098
-    expected = np.array([vx - vy - arm * wz, vx + vy + arm * wz, vx + vy - arm * wz, vx - vy + arm * wz]) / radius
+    expected = (
+        np.array([vx - vy - arm * wz, vx + vy + arm * wz, vx + vy - arm * wz, vx - vy + arm * wz])
+        / radius
+    )
     np.testing.assert_allclose(mecanum_robot.wheel_speeds(vx, vy, wz), expected, rtol=1e-12)
 
 
@@ -136,4 +139,6 @@ def test_a_simulated_robot_is_a_platform(mecanum_robot: SimRobot) -> None:
     assert platform.body.mass == pytest.approx(14.5 + 4 * 1.44)
     assert platform.body.contacts == mecanum_robot.wheel_positions
     twist = np.array([0.3, -0.2, 0.7])
-    np.testing.assert_allclose(platform.forward @ mecanum_robot.wheel_speeds(*twist), twist, atol=1e-12)
+    np.testing.assert_allclose(
+        platform.forward @ mecanum_robot.wheel_speeds(*twist), twist, atol=1e-12
+    )

@@ -21,7 +21,9 @@ SPEED = 3.0 / 3.6  # m/s, the thesis's 3 km/h
 
 
 @pytest.mark.parametrize(("name", "direction"), DIRECTIONS)
-def test_five_metres_within_two_percent(mecanum_robot: SimRobot, name: str, direction: float) -> None:
+def test_five_metres_within_two_percent(
+    mecanum_robot: SimRobot, name: str, direction: float
+) -> None:
     command = straight_command(mecanum_robot, direction, 5.0, SPEED)
     run = PyBullet().run(mecanum_robot, Scene(), command)
     off = deviation(run, direction, 5.0)
@@ -44,7 +46,16 @@ def test_repetition_is_bit_identical_and_starts_as_asked(mecanum_robot: SimRobot
         (9.0, -7.5, 0.3, 0.0),
     )
     first, again = (PyBullet().run(mecanum_robot, Scene(0.6), command) for _ in range(2))
-    for name in ("times", "pose", "height", "roll", "pitch", "wheel_angles", "wheel_speeds", "contacts"):
+    for name in (
+        "times",
+        "pose",
+        "height",
+        "roll",
+        "pitch",
+        "wheel_angles",
+        "wheel_speeds",
+        "contacts",
+    ):
         assert getattr(first, name).tobytes() == getattr(again, name).tobytes(), name
     np.testing.assert_allclose(first.pose[0], [1.0, -2.0, 3.0], atol=2e-3)
     np.testing.assert_allclose(first.wheel_angles[0], [9.0, -7.5, 0.3, 0.0], atol=1e-3)
@@ -99,7 +110,9 @@ def test_bad_settle_is_refused(mecanum_robot: SimRobot) -> None:
         PyBullet().run(mecanum_robot, Scene(), command, settle=-1.0)
 
 
-def test_missing_package_says_how_to_get_it(mecanum_robot: SimRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_package_says_how_to_get_it(
+    mecanum_robot: SimRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "pybullet", None)
     command = Command(np.array([0.0, 0.1]), np.zeros((2, 4)))
     with pytest.raises(MissingDependencyError, match=r"trajopt\[simulate\]"):

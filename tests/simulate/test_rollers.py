@@ -56,16 +56,25 @@ def test_sphere_chain_touches_the_rim_and_never_passes_it(
 
 @pytest.mark.parametrize(
     ("shape", "below", "above"),
-    [("barrel", 2e-5, 1e-7), ("ellipsoid", 1e-4, 1e-7), ("cylinder", 1e-7, 1.4e-3), ("cone", 0.0, 4e-3)],
+    [
+        ("barrel", 2e-5, 1e-7),
+        ("ellipsoid", 1e-4, 1e-7),
+        ("cylinder", 1e-7, 1.4e-3),
+        ("cone", 0.0, 4e-3),
+    ],
 )
-def test_other_shapes_deviate_as_their_geometry_says(shape: Shape, below: float, above: float) -> None:
+def test_other_shapes_deviate_as_their_geometry_says(
+    shape: Shape, below: float, above: float
+) -> None:
     built = support_height(mecanum_wheel(RADIUS, shape=shape), ROUND)
     assert np.min(built) >= RADIUS - below - 1e-9
     assert np.max(built) <= RADIUS + above
 
 
 def test_cylinder_ends_stand_out_by_the_closed_form() -> None:
-    built = support_height(mecanum_wheel(RADIUS, rollers=18, roller_radius=0.0095, shape="cylinder"), ROUND)
+    built = support_height(
+        mecanum_wheel(RADIUS, rollers=18, roller_radius=0.0095, shape="cylinder"), ROUND
+    )
     edge, lean = math.pi / 18, math.sin(math.pi / 18) * math.cos(math.radians(45.0))
     expected = 0.0885 / math.cos(edge) + 0.0095 * math.sqrt(1.0 - lean**2)
     assert np.max(built) == pytest.approx(expected, abs=1e-5)  # the peak lies just beside the edge
@@ -86,12 +95,16 @@ def test_outline_point_of_an_ellipse() -> None:
         point = outline_point(phi, lambda p: np.sqrt((a * np.sin(p)) ** 2 + (b * np.cos(p)) ** 2))
         assert (point[0] / a) ** 2 + (point[2] / b) ** 2 == pytest.approx(1.0, abs=1e-8)
         gradient = np.array([point[0] / a**2, 0.0, point[2] / b**2])
-        np.testing.assert_allclose(gradient / np.linalg.norm(gradient), normals(np.array(phi)), atol=1e-6)
+        np.testing.assert_allclose(
+            gradient / np.linalg.norm(gradient), normals(np.array(phi)), atol=1e-6
+        )
 
 
 def test_mecanum_rollers_lean_as_asked_where_they_meet_the_ground() -> None:
     for degrees in (-45.0, 45.0):
-        lowest = min(mecanum_wheel(RADIUS, angle=math.radians(degrees)).rollers, key=lambda r: r.centre[2])
+        lowest = min(
+            mecanum_wheel(RADIUS, angle=math.radians(degrees)).rollers, key=lambda r: r.centre[2]
+        )
         assert math.atan2(lowest.axis[1], lowest.axis[0]) == pytest.approx(math.radians(degrees))
         assert lowest.axis[2] == pytest.approx(0.0)
 
@@ -109,7 +122,9 @@ def test_turning_a_roller_carries_its_normal_angle() -> None:
     for phi in (0.3, 2.0):
         moved = turned(roller, phi)
         np.testing.assert_allclose(moved.centre, 0.0885 * normals(np.array(phi)), atol=1e-12)
-        assert np.dot(moved.axis, moved.centre) == pytest.approx(np.dot(roller.axis, roller.centre), abs=1e-12)
+        assert np.dot(moved.axis, moved.centre) == pytest.approx(
+            np.dot(roller.axis, roller.centre), abs=1e-12
+        )
 
 
 def test_revolved_vertices_lie_on_the_profile_and_shrink_inside() -> None:
@@ -117,7 +132,9 @@ def test_revolved_vertices_lie_on_the_profile_and_shrink_inside() -> None:
     assert isinstance(profile, Revolved)
     vertices = revolve(profile, sides=16)
     rings = vertices.reshape(len(profile.stations), 16, 3)
-    np.testing.assert_allclose(np.hypot(rings[..., 0], rings[..., 1]), np.array(profile.radii)[:, None] * np.ones(16))
+    np.testing.assert_allclose(
+        np.hypot(rings[..., 0], rings[..., 1]), np.array(profile.radii)[:, None] * np.ones(16)
+    )
     slim = revolve(profile, sides=16, shrink=1e-3).reshape(rings.shape)
     assert np.all(np.hypot(slim[..., 0], slim[..., 1]) < np.hypot(rings[..., 0], rings[..., 1]))
     assert slim[0, 0, 2] > rings[0, 0, 2]

@@ -35,7 +35,9 @@ def test_a_measured_row_is_written_with_its_conditions(tmp_path: Path) -> None:
 
 
 def test_one_bad_run_makes_the_verdict() -> None:
-    good = Row(Case("mujoco", "SMDW", "barrel", "forward", 1.0), 0.01, -0.02, 0.0, 0.0, 0.0, 9.0, "")
+    good = Row(
+        Case("mujoco", "SMDW", "barrel", "forward", 1.0), 0.01, -0.02, 0.0, 0.0, 0.0, 9.0, ""
+    )
     worse = dataclasses.replace(good, across=-0.031)
     thrown = dataclasses.replace(good, reason="the state is not finite")
     assert summary([good])[0][-1] == "within 3 %"

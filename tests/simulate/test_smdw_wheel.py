@@ -20,7 +20,9 @@ ROUND = np.linspace(-math.pi, math.pi, 3601)
 
 def hub(wheel: RollerWheel, side: float) -> RollerWheel:
     rollers = tuple(roller for roller in wheel.rollers if roller.centre[1] * side > 0.0)
-    return RollerWheel(wheel.radius, wheel.width, wheel.angle, rollers, wheel.hub_mass, wheel.roller_mass)
+    return RollerWheel(
+        wheel.radius, wheel.width, wheel.angle, rollers, wheel.hub_mass, wheel.roller_mass
+    )
 
 
 @pytest.mark.parametrize("shape", ["spheres", "barrel", "ellipsoid"])
@@ -67,7 +69,9 @@ def test_robot_has_the_printed_wheel_mass_and_fits_into_bullet() -> None:
     robot = loc8_smdw()
     assert [wheel.mass for wheel in robot.wheels] == pytest.approx([WHEEL_MASS] * 4)
     assert 4 + sum(len(wheel.rollers) for wheel in robot.wheels) <= MAX_JOINTS
-    np.testing.assert_allclose(robot.wheel_speeds(0.0, 1.0, 0.0), np.array([-1.0, 1.0, 1.0, -1.0]) / 0.098, rtol=1e-12)
+    np.testing.assert_allclose(
+        robot.wheel_speeds(0.0, 1.0, 0.0), np.array([-1.0, 1.0, 1.0, -1.0]) / 0.098, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize(
@@ -77,7 +81,10 @@ def test_robot_has_the_printed_wheel_mass_and_fits_into_bullet() -> None:
         (lambda: DoubleWheel(depth=0.0), "depth"),
         (lambda: smdw_wheel(circle_rollers=1), "rollers"),
         (lambda: smdw_wheel(mass=0.5), "mass"),
-        (lambda: smdw_wheel(DoubleWheel(minor_radius=0.02), ellipse_roller_radius=0.03), "roller_radius"),
+        (
+            lambda: smdw_wheel(DoubleWheel(minor_radius=0.02), ellipse_roller_radius=0.03),
+            "roller_radius",
+        ),
     ],
 )
 def test_impossible_wheels_name_the_argument(make: object, named: str) -> None:

@@ -1,4 +1,5 @@
-"""Sweeps on a real Slurm: job arrays, Dask on Slurm, kills. ``. tests/slurm/start.sh`` starts one on loopback."""
+"""Sweeps on a real Slurm: job arrays, Dask on Slurm, kills. ``. tests/slurm/start.sh`` starts one
+on loopback."""
 
 from __future__ import annotations
 
@@ -24,8 +25,12 @@ LIMITS = CaseLimits(60.0, 0)
 def _slurm_answers() -> bool:
     if shutil.which("sinfo") is None:
         return False
-    told = subprocess.run(["sinfo", "--noheader", "--format=%T"], capture_output=True, text=True, check=False)
-    return told.returncode == 0 and any(s in told.stdout for s in ("idle", "mixed", "alloc", "completing"))
+    told = subprocess.run(
+        ["sinfo", "--noheader", "--format=%T"], capture_output=True, text=True, check=False
+    )
+    return told.returncode == 0 and any(
+        s in told.stdout for s in ("idle", "mixed", "alloc", "completing")
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +51,9 @@ def test_an_array_gives_the_same_table(tmp_path: Path, table_of_one_process: str
     store = swept("slurm", 2000, tmp_path)
     assert digest(store) == table_of_one_process
     table = tabled(cases(2000), paced_mixed, None, None)
-    again = submit(table, paced_mixed, store, limits=LIMITS, options=SlurmOptions(), case_seconds=0.05)
+    again = submit(
+        table, paced_mixed, store, limits=LIMITS, options=SlurmOptions(), case_seconds=0.05
+    )
     assert (again.job, again.cases) == ("", 0)
 
 
@@ -60,13 +67,23 @@ def test_dask_on_slurm_gives_the_same_table(tmp_path: Path, table_of_one_process
 def test_a_requeued_element_goes_on(tmp_path: Path) -> None:
     store = open_store(tmp_path / "array")
     table = tabled(cases(2000), paced, None, None)
-    done = submit(table, paced, store, limits=LIMITS, case_seconds=0.01,
-                  options=SlurmOptions(elements=1, memory="500M", extra=("--begin=now",)))
+    done = submit(
+        table,
+        paced,
+        store,
+        limits=LIMITS,
+        case_seconds=0.01,
+        options=SlurmOptions(elements=1, memory="500M", extra=("--begin=now",)),
+    )
     deadline = time.monotonic() + 60
     while len(store.finished()) < 300 and time.monotonic() < deadline:
         time.sleep(0.2)
     subprocess.run(["scontrol", "requeue", f"{done.job}_0"], check=True)
-    subprocess.run(["scontrol", "update", f"JobId={done.job}_0", "StartTime=now"], check=False, capture_output=True)
+    subprocess.run(
+        ["scontrol", "update", f"JobId={done.job}_0", "StartTime=now"],
+        check=False,
+        capture_output=True,
+    )
     deadline = time.monotonic() + 240
     while len(store.finished()) < 2000 and time.monotonic() < deadline:
         time.sleep(0.5)

@@ -1,4 +1,5 @@
-"""Climb trials: interval, judgement and bookkeeping; one climb and one that cannot be, in MuJoCo."""
+"""Climb trials: interval, judgement and bookkeeping; one climb and one that cannot be, in
+MuJoCo."""
 
 import math
 from dataclasses import replace
@@ -12,7 +13,16 @@ from trajopt.errors import ArgumentError
 from trajopt.maneuver import Plan, configurations, plan_configuration
 from trajopt.maneuver_problem import load_maneuver
 from trajopt.problem import WHEELS
-from trajopt.simulate.climb import Climb, Outcome, StepScene, climb_all, judge, rate, run_climb, wilson
+from trajopt.simulate.climb import (
+    Climb,
+    Outcome,
+    StepScene,
+    climb_all,
+    judge,
+    rate,
+    run_climb,
+    wilson,
+)
 from trajopt.simulate.engine import Recording
 
 FILE = Path(__file__).parents[2] / "problems" / "smdw" / "step_5cm.toml"
@@ -33,14 +43,29 @@ def test_wilson_edges() -> None:
 
 
 def recording(rise: np.ndarray, turned: float, exploded: bool = False) -> Recording:
-    """Two seconds in which the wheels rise by ``rise`` (4,) from half time on, turning evenly by ``turned``."""
+    """Two seconds in which the wheels rise by ``rise`` (4,) from half time on, turning evenly by
+    ``turned``."""
     times = np.linspace(0, 2, 201)
     heights = 0.098 + np.where(times[:, None] > 1.0, rise, 0.0)
     zero4, zero = np.zeros((201, 4)), np.zeros(201)
-    return Recording("none", "0", times, np.zeros((201, 3)), zero, zero, zero, np.outer(times / 2, np.full(4, turned)),
-                     zero4, zero4, heights,
-                     np.zeros(201, dtype=np.int64), exploded,
-                     "why" if exploded else "", 1.0, 1.0)
+    return Recording(
+        "none",
+        "0",
+        times,
+        np.zeros((201, 3)),
+        zero,
+        zero,
+        zero,
+        np.outer(times / 2, np.full(4, turned)),
+        zero4,
+        zero4,
+        heights,
+        np.zeros(201, dtype=np.int64),
+        exploded,
+        "why" if exploded else "",
+        1.0,
+        1.0,
+    )
 
 
 def test_a_wheel_is_up_at_seven_tenths_of_the_step() -> None:
@@ -57,7 +82,10 @@ def test_a_wheel_is_up_at_seven_tenths_of_the_step() -> None:
 
 
 def test_exploded_runs_are_counted_and_left_out() -> None:
-    good, bad = Outcome((True,) * 4, True, True, False, "", 0.0), judge(CLIMB, recording(np.ones(4), 1.0, True))
+    good, bad = (
+        Outcome((True,) * 4, True, True, False, "", 0.0),
+        judge(CLIMB, recording(np.ones(4), 1.0, True)),
+    )
     found = rate([good, bad, good])
     assert (found.successes, found.trials, found.exploded) == (2, 2, 1)
     assert found.share == 1.0
@@ -83,7 +111,14 @@ def test_planned_lateral_climb_gets_up_and_a_wall_does_not() -> None:
     assert isinstance(plan, Plan)
     a, b, c, d = plan.target.wheels
     i, j = (WHEELS.index(w) for w in plan.configuration.critical)
-    climb = Climb(STEP, plan.target.pose, (a, b, c, d), plan.configuration.direction, (i, j), plan.target.travel)
+    climb = Climb(
+        STEP,
+        plan.target.pose,
+        (a, b, c, d),
+        plan.configuration.direction,
+        (i, j),
+        plan.target.travel,
+    )
     first = run_climb(climb)
     assert first.critical_up
     assert not first.exploded

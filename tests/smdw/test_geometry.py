@@ -1,4 +1,5 @@
-"""Two ways to the same wheel: closed form against point cloud, and both against the printed numbers."""
+"""Two ways to the same wheel: closed form against point cloud, and both against the printed
+numbers."""
 
 import math
 
@@ -54,7 +55,9 @@ def test_cloud_and_closed_form_agree_on_the_whole_grid(height: float) -> None:
                 assert cloud.clearance == pytest.approx(exact.clearance[k], abs=1e-4), where
                 assert cloud.offset == pytest.approx(exact.offset[k], abs=1e-4), where
                 assert cloud.arm == pytest.approx(exact.arm[k], abs=1e-4), where
-                assert math.degrees(cloud.tangent) == pytest.approx(math.degrees(exact.tangent[k]), abs=0.1), where
+                assert math.degrees(cloud.tangent) == pytest.approx(
+                    math.degrees(exact.tangent[k]), abs=0.1
+                ), where
 
 
 @given(st.floats(-7.0, 7.0))
@@ -62,15 +65,19 @@ def test_support_function_is_the_lowest_point_of_the_outline(angle: float) -> No
     x, z = turned(angle)
     lowest = int(np.argmin(z))
     assert support_down(DEFAULT_WHEEL, angle) == pytest.approx(-z[lowest], abs=1e-7)
-    if abs(math.cos(angle)) > 1e-3:  # at the joint of circle and ellipse the lowest point is the same
+    if (
+        abs(math.cos(angle)) > 1e-3
+    ):  # at the joint of circle and ellipse the lowest point is the same
         assert contact_offset(DEFAULT_WHEEL, angle) == pytest.approx(x[lowest], abs=1e-4)
 
 
 @settings(max_examples=60)
 @given(st.floats(-math.pi, math.pi), st.floats(-math.pi, 0.0), st.floats(0.005, 0.09))
-def test_no_point_of_either_hub_contradicts_the_meeting(theta: float, yaw: float, height: float) -> None:
-    """Straight from the definition: nothing of the carrying hub below the step is beyond the line, and
-    nothing of the lifted hub beyond the line is below the clearance."""
+def test_no_point_of_either_hub_contradicts_the_meeting(
+    theta: float, yaw: float, height: float
+) -> None:
+    """Straight from the definition: nothing of the carrying hub below the step is beyond the line,
+    and nothing of the lifted hub beyond the line is below the clearance."""
     found = meet_step(DEFAULT_WHEEL, theta, yaw, height)
     half, full = DEFAULT_WHEEL.gap / 2, DEFAULT_WHEEL.gap / 2 + DEFAULT_WHEEL.depth
     facing_lifted = math.cos(theta) >= 0
@@ -93,7 +100,9 @@ def test_printed_contact_offsets_are_met_by_fitted_sizes_only() -> None:
     assert FITTED_WHEEL.greatest_clearance == pytest.approx(0.0475, abs=1e-4)
     assert not verdict(FITTED_WHEEL, 0.0, Motion.LEFT, 0.0, 0.05).climbs
     assert contact_offset(DEFAULT_WHEEL, angles) == pytest.approx([0.05027, 0.03636], abs=1e-5)
-    assert contact_offset(DEFAULT_WHEEL, np.radians([0.0, 90.0])) == pytest.approx([0.0, 0.0], abs=1e-15)
+    assert contact_offset(DEFAULT_WHEEL, np.radians([0.0, 90.0])) == pytest.approx(
+        [0.0, 0.0], abs=1e-15
+    )
 
 
 def test_forward_range_of_a_five_centimetre_step_contains_35_degrees() -> None:
@@ -109,12 +118,21 @@ def test_windows_end_where_the_hub_no_longer_clears_the_step() -> None:
     for height in (0.035, 0.05):
         lateral = climb_window(DEFAULT_WHEEL, Motion.LEFT, 0.0, height)
         assert lateral is not None
-        assert support_down(DEFAULT_WHEEL, lateral.high) == pytest.approx(DEFAULT_WHEEL.radius - height, abs=1e-12)
+        assert support_down(DEFAULT_WHEEL, lateral.high) == pytest.approx(
+            DEFAULT_WHEEL.radius - height, abs=1e-12
+        )
         forward = climb_window(DEFAULT_WHEEL, Motion.FORWARD, math.radians(-35), height)
         assert forward is not None
-        for angle, climbs in ((forward.low, True), (forward.high, True), (forward.low - 0.01, False),
-                              (forward.high + 0.01, False)):
-            assert verdict(DEFAULT_WHEEL, angle, Motion.FORWARD, math.radians(-35), height).climbs is climbs
+        for angle, climbs in (
+            (forward.low, True),
+            (forward.high, True),
+            (forward.low - 0.01, False),
+            (forward.high + 0.01, False),
+        ):
+            assert (
+                verdict(DEFAULT_WHEEL, angle, Motion.FORWARD, math.radians(-35), height).climbs
+                is climbs
+            )
     assert climb_window(DEFAULT_WHEEL, Motion.LEFT, 0.0, 0.052) is None
     assert climb_window(DEFAULT_WHEEL, Motion.FORWARD, 0.0, 0.05) is None
 

@@ -1,4 +1,5 @@
-"""The planner's promises, recomputed from outside: exact wheels, free ground, contact at the wanted place."""
+"""The planner's promises, recomputed from outside: exact wheels, free ground, contact at the wanted
+place."""
 
 import math
 from pathlib import Path
@@ -8,7 +9,15 @@ import pytest
 from scipy.integrate import quad
 
 from trajopt.errors import ArgumentError, ProblemError
-from trajopt.maneuver import Maneuver, Plan, Refused, approach_target, configurations, plan_climb, plan_configuration
+from trajopt.maneuver import (
+    Maneuver,
+    Plan,
+    Refused,
+    approach_target,
+    configurations,
+    plan_climb,
+    plan_configuration,
+)
 from trajopt.maneuver_problem import ManeuverProblem, load_maneuver
 from trajopt.objectives.clearance import ClearObjective
 from trajopt.objectives.terminal import TerminalObjective
@@ -72,15 +81,21 @@ def test_footprint_stays_on_free_ground(maneuver: Maneuver) -> None:
         assert 0 <= plan.room <= maneuver.problem.approach.gap + 1e-9
 
 
-def test_rolling_on_from_the_target_meets_the_step_in_the_middle_of_the_window(maneuver: Maneuver) -> None:
+def test_rolling_on_from_the_target_meets_the_step_in_the_middle_of_the_window(
+    maneuver: Maneuver,
+) -> None:
     """Drive the remaining travel by hand: phase, distance to the edge, and place along it."""
     problem = maneuver.problem
     for plan in maneuver.plans:
         c, target = plan.configuration, plan.target
         x, y, yaw = target.pose
         spin = np.sign(problem.platform.inverse @ [*c.direction, 0.0])
-        places = {"front-left": (0.376, 0.316), "front-right": (0.376, -0.316), "rear-left": (-0.376, 0.316),
-                  "rear-right": (-0.376, -0.316)}
+        places = {
+            "front-left": (0.376, 0.316),
+            "front-right": (0.376, -0.316),
+            "rear-left": (-0.376, 0.316),
+            "rear-right": (-0.376, -0.316),
+        }
         met = []
         for name, travel in zip(c.critical, target.travel, strict=True):
             i = WHEELS.index(name)
@@ -90,7 +105,9 @@ def test_rolling_on_from_the_target_meets_the_step_in_the_middle_of_the_window(m
             py = y + travel * (math.sin(yaw) * dx + math.cos(yaw) * dy)
             wx, wy = places[name]
             along = math.cos(yaw) * wx - math.sin(yaw) * wy
-            reach = collision_reach(problem.robot.wheel, c.window.middle, c.motion, c.alpha, problem.obstacle.height)
+            reach = collision_reach(
+                problem.robot.wheel, c.window.middle, c.motion, c.alpha, problem.obstacle.height
+            )
             assert px + along + reach == pytest.approx(problem.obstacle.place[0], abs=1e-9)
             met.append(py + math.sin(yaw) * wx + math.cos(yaw) * wy)
             phase = spin[i] * target.wheels[i] + travel / 0.098
@@ -108,19 +125,34 @@ def test_turns_stay_within_a_quarter() -> None:
         found = configurations(problem.robot.wheel, problem.obstacle, start)
         assert found
         assert all(abs(c.yaw - start) <= math.pi / 2 + 1e-9 for c in found)
-    assert {c.motion for c in configurations(problem.robot.wheel, problem.obstacle, 1.0)} >= {Motion.RIGHT}
-    assert Motion.LEFT not in {c.motion for c in configurations(problem.robot.wheel, problem.obstacle, 1.0)}
+    assert {c.motion for c in configurations(problem.robot.wheel, problem.obstacle, 1.0)} >= {
+        Motion.RIGHT
+    }
+    assert Motion.LEFT not in {
+        c.motion for c in configurations(problem.robot.wheel, problem.obstacle, 1.0)
+    }
 
 
 def test_a_step_turned_in_the_world_turns_the_plans() -> None:
     straight = load_maneuver(PROBLEMS / FILES[0])
-    turned = straight.replace({"obstacle.direction": math.pi / 2, "obstacle.place": [-0.76, 2.856],
-                               "space.x": [-1.5, 1.5], "space.y": [-0.6, 2.856],
-                               "start.pose": [0.0, 0.0, math.pi / 2]})
-    for a, b in zip(configurations(straight.robot.wheel, straight.obstacle),
-                    configurations(turned.robot.wheel, turned.obstacle, math.pi / 2), strict=True):
+    turned = straight.replace(
+        {
+            "obstacle.direction": math.pi / 2,
+            "obstacle.place": [-0.76, 2.856],
+            "space.x": [-1.5, 1.5],
+            "space.y": [-0.6, 2.856],
+            "start.pose": [0.0, 0.0, math.pi / 2],
+        }
+    )
+    for a, b in zip(
+        configurations(straight.robot.wheel, straight.obstacle),
+        configurations(turned.robot.wheel, turned.obstacle, math.pi / 2),
+        strict=True,
+    ):
         first, second = approach_target(straight, a), approach_target(turned, b)
-        assert second.pose == pytest.approx((-first.pose[1], first.pose[0], first.pose[2] + math.pi / 2), abs=1e-12)
+        assert second.pose == pytest.approx(
+            (-first.pose[1], first.pose[0], first.pose[2] + math.pi / 2), abs=1e-12
+        )
         assert second.wheels == pytest.approx(first.wheels, abs=1e-12)
     a, b = plan_climb(straight), plan_climb(turned)
     # The default P1 of Table 5.4 favours an axis, so paths differ a little.
@@ -135,7 +167,13 @@ def left_plan(problem: ManeuverProblem) -> ClearObjective:
 
 
 def test_violation_is_the_depth_of_the_footprint_outside() -> None:
-    ground = FreeGround((-1.0, 1.0), (-1.0, 1.0), (1.0, 0.0), 0.8, ((0.5, 0.2), (-0.5, 0.2), (-0.5, -0.2), (0.5, -0.2)))
+    ground = FreeGround(
+        (-1.0, 1.0),
+        (-1.0, 1.0),
+        (1.0, 0.0),
+        0.8,
+        ((0.5, 0.2), (-0.5, 0.2), (-0.5, -0.2), (0.5, -0.2)),
+    )
     assert ground.margin(np.array(0.0), np.array(0.0), np.array(0.0)) == pytest.approx(0.3)
     assert ground.margin(np.array(0.4), np.array(0.0), np.array(0.0)) == pytest.approx(-0.1)
     assert ground.margin(np.array(0.0), np.array(0.9), np.array(math.pi / 2)) == pytest.approx(-0.4)
@@ -146,7 +184,8 @@ def test_violation_is_the_depth_of_the_footprint_outside() -> None:
 
 @pytest.mark.parametrize("optimizer", ["lattice", "pso", "ipopt"])
 def test_optimizers_see_the_violation(optimizer: str) -> None:
-    """In a narrow space the terminal cost alone leaves it; with the violation every optimizer stays inside."""
+    """In a narrow space the terminal cost alone leaves it; with the violation every optimizer stays
+    inside."""
     problem = load_maneuver(PROBLEMS / FILES[1])
     objective = left_plan(problem)
     found = minimize(objective, objective.bounds, optimizer=optimizer, seed=1)
@@ -168,16 +207,19 @@ def test_other_optimizers_plan_too() -> None:
     assert plan.room >= 0
 
 
-@pytest.mark.parametrize(("changes", "text"), [
-    ({"obstacle.height": 0.06}, "at most Rc - Re = 5.10 cm"),
-    ({"obstacle.height": 0.0}, "obstacle.height"),
-    ({"start.pose": [2.6, 0.0, 0.0]}, "before the step"),
-    ({"start.pose": [0.0, 1.4, 0.0]}, "inside the space"),
-    ({"ground.friction": 0.0}, "ground.friction"),
-    ({"limits.friction": 0.0}, "limits.friction"),
-    ({"obstacle.heigth": 0.05}, "nearest is 'height'"),
-    ({"robot.minor_radius": 0.2}, "robot.minor_radius"),
-])
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"obstacle.height": 0.06}, "at most Rc - Re = 5.10 cm"),
+        ({"obstacle.height": 0.0}, "obstacle.height"),
+        ({"start.pose": [2.6, 0.0, 0.0]}, "before the step"),
+        ({"start.pose": [0.0, 1.4, 0.0]}, "inside the space"),
+        ({"ground.friction": 0.0}, "ground.friction"),
+        ({"limits.friction": 0.0}, "limits.friction"),
+        ({"obstacle.heigth": 0.05}, "nearest is 'height'"),
+        ({"robot.minor_radius": 0.2}, "robot.minor_radius"),
+    ],
+)
 def test_one_clear_message_each(changes: dict[str, object], text: str) -> None:
     problem = load_maneuver(PROBLEMS / FILES[0])
     with pytest.raises((ProblemError, ArgumentError)) as caught:
@@ -196,8 +238,11 @@ def test_a_space_too_small_is_said_so() -> None:
 def test_without_a_turn_wheel_angles_cannot_be_chosen() -> None:
     problem = load_maneuver(PROBLEMS / FILES[0])
     problem = problem.replace({"start.pose": [0.2, 0.0, math.radians(-35)]})
-    square_on = [c for c in configurations(problem.robot.wheel, problem.obstacle, problem.start.pose[2])
-                 if c.name == "forward -35 deg"]
+    square_on = [
+        c
+        for c in configurations(problem.robot.wheel, problem.obstacle, problem.start.pose[2])
+        if c.name == "forward -35 deg"
+    ]
     refused = plan_configuration(problem, square_on[0])
     assert isinstance(refused, Refused)
     assert "turn" in refused.reason

@@ -1,4 +1,5 @@
-"""Pictures of trials and searches, and the page's tables: what they show follows from the rows they are given."""
+"""Pictures of trials and searches, and the page's tables: what they show follows from the rows they
+are given."""
 
 from __future__ import annotations
 
@@ -62,31 +63,41 @@ def test_every_ending_is_drawn_in_its_units() -> None:
 
 def test_motions_draw_a_line_a_run_and_the_step_where_it_is() -> None:
     pose = np.linspace([0.0, 0.0, 0.0], [1.0, 0.5, -0.6], 20)
-    panels = [smdw_trials.Motions("planned", [pose, pose], [True, False], pose, 1.4, ""),
-              smdw_trials.Motions("no plan, no step", [pose], [True], None, None, "")]
+    panels = [
+        smdw_trials.Motions("planned", [pose, pose], [True, False], pose, 1.4, ""),
+        smdw_trials.Motions("no plan, no step", [pose], [True], None, None, ""),
+    ]
     with_step, without = smdw_trials.motions_figure(panels, loc8_smdw()).axes[:2]
     assert len(with_step.get_lines()) == 3
     assert len(without.get_lines()) == 1
     assert with_step.get_xlim()[1] > 1.4
-    assert len(with_step.patches) - len(without.patches) == 5  # two more robots (outline and nose), the step
+    assert (
+        len(with_step.patches) - len(without.patches) == 5
+    )  # two more robots (outline and nose), the step
 
 
 def test_searches_and_costs_draw_a_line_a_run() -> None:
     pose = np.linspace([0.0, 0.0], [1.0, 0.5], 20)
     searches = search_pictures.searches_figure([("PSO", [("1 s", pose)])], np.array([1.0, 0.5]))
     assert len(searches.axes[0].get_lines()) == 2  # and the goal
-    costs = search_pictures.costs_figure([("scenario 1", [(np.arange(3.0), np.array([3.0, 1.0, 0.0]))] * 2)])
+    costs = search_pictures.costs_figure(
+        [("scenario 1", [(np.arange(3.0), np.array([3.0, 1.0, 0.0]))] * 2)]
+    )
     assert len(costs.axes[0].get_lines()) == 2
 
 
 def test_swarms_and_cost_maps_show_what_they_are_given() -> None:
     path, places = np.linspace([0.0, 0.0], [1.0, 0.5], 20), np.array([[0.1, 0.2], [5.0, 5.0]])
     swarm = search_pictures.SwarmSearch("one", places, path, path[10])
-    axes = search_pictures.swarms_figure([swarm], ((0.0, 1.0), (0.0, 1.0)), ((-1.0, 2.0), (-1.0, 2.0))).axes[0]
+    axes = search_pictures.swarms_figure(
+        [swarm], ((0.0, 1.0), (0.0, 1.0)), ((-1.0, 2.0), (-1.0, 2.0))
+    ).axes[0]
     assert np.asarray(axes.get_lines()[0].get_xdata()) == pytest.approx([0.1, 5.0])
     assert axes.get_xlim() == (-1.0, 2.0)
     cost = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    shown = search_pictures.CostMap("map", np.arange(3.0), np.arange(2.0), cost, np.array([[1.0, 0.5]]))
+    shown = search_pictures.CostMap(
+        "map", np.arange(3.0), np.arange(2.0), cost, np.array([[1.0, 0.5]])
+    )
     mesh = search_pictures.cost_maps_figure([shown]).axes[0].collections[0]
     assert np.asarray(mesh.get_array()).ravel() == pytest.approx(cost.ravel())
 
@@ -99,7 +110,8 @@ def test_figure_6_9_stands_the_step_at_the_highest_that_the_hub_clears() -> None
     axes = smdw.wheel_at_step_figure(DEFAULT_WHEEL, alpha, theta, 0.035).axes
     assert f"{100 * top:.1f} cm" in axes[0].get_title(loc="left") + axes[0].get_title()
     assert axes[1].get_lines()[-1].get_ydata() == pytest.approx(
-        100 * float(meet_step(DEFAULT_WHEEL, theta, alpha, 0.035).clearance))
+        100 * float(meet_step(DEFAULT_WHEEL, theta, alpha, 0.035).clearance)
+    )
 
 
 def test_a_folder_of_plans_gets_its_overview(tmp_path: Path) -> None:

@@ -46,14 +46,27 @@ class Bad:
             time.sleep(60.0)
         if self.kind == "changes its argument":
             x[:] = 1e9
-        bad = {"returns NaN": np.full(len(x), np.nan), "returns inf": np.full(len(x), np.inf),
-               "wrong shape": np.ones((len(x), 3))}
+        bad = {
+            "returns NaN": np.full(len(x), np.nan),
+            "returns inf": np.full(len(x), np.inf),
+            "wrong shape": np.ones((len(x), 3)),
+        }
         return Evaluation(bad.get(self.kind, cost), np.zeros(len(x)))
 
     def score(self, x):
         return self.evaluate(np.array(x)[None])
 
 
-PROBLEMS = {f"bad/{kind}": (lambda kind=kind: (Bad(kind), [[-1.0, 2.0]] * 2)) for kind in (
-    "raises", "hangs", "returns NaN", "returns inf", "wrong shape", "changes its argument", "good")}
+PROBLEMS = {
+    f"bad/{kind}": (lambda kind=kind: (Bad(kind), [[-1.0, 2.0]] * 2))
+    for kind in (
+        "raises",
+        "hangs",
+        "returns NaN",
+        "returns inf",
+        "wrong shape",
+        "changes its argument",
+        "good",
+    )
+}
 assert Status.CONVERGED

@@ -1,12 +1,13 @@
-"""Kill sweeps with SIGKILL at random instants, run them again, and check that nothing is lost or doubled.
+"""Kill sweeps with SIGKILL at random instants, run them again, and check that nothing is lost or
+doubled.
 
     python -m tests.study.crashes --kills 300 --engine processes
     python -m tests.study.crashes --kills 300 --engine dask
     python -m tests.study.crashes --kills 20 --engine slurm        (needs a running Slurm)
 
-A kill hits one process of the sweep (worker or its child), the submitting process, or the whole tree. After it
-the sweep runs on, or is started again; a finished sweep is compared with one that nobody disturbed, and a new
-one begins. A reader looks at the store all the time.
+A kill hits one process of the sweep (worker or its child), the submitting process, or the whole
+tree. After it the sweep runs on, or is started again; a finished sweep is compared with one that
+nobody disturbed, and a new one begins. A reader looks at the store all the time.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ TARGETS = ("process", "submitter", "tree")
 
 @dataclass
 class Outcome:
-    """What happened: kills by target, sweeps compared, reads of living stores, and every fault found."""
+    """What happened: kills by target, sweeps compared, reads of living stores, and every fault
+    found."""
 
     kills: Counter[str] = field(default_factory=Counter)
     sweeps: int = 0
@@ -55,13 +57,16 @@ def cases(count: int) -> list[dict[str, int]]:
 
 
 def digest(store: Store) -> str:
-    """Hash of the sorted table without its columns of time, host and path, as CSV bytes, and of the arrays."""
+    """Hash of the sorted table without its columns of time, host and path, as CSV bytes, and of the
+    arrays."""
     text = io.StringIO()
     store.stable_table().to_pandas().to_csv(text, index=False)
     arrays = [pd.read_parquet(p) for p in store.parts("arrays")]
     if arrays:
         beside = pd.concat(arrays).drop_duplicates(["case", "name"]).sort_values(["case", "name"])
-        beside.assign(**{c: beside[c].map(list) for c in ("shape", "values")}).to_csv(text, index=False)
+        beside.assign(**{c: beside[c].map(list) for c in ("shape", "values")}).to_csv(
+            text, index=False
+        )
     return hashlib.sha256(text.getvalue().encode()).hexdigest()
 
 
@@ -75,7 +80,9 @@ def descendants(root: int) -> list[int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
-                parents[int(entry.name)] = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+                parents[int(entry.name)] = int(
+                    (entry / "stat").read_text().rsplit(")", 1)[1].split()[1]
+                )
             except (OSError, IndexError):
                 continue
     found, todo = [], [root]
@@ -119,13 +126,17 @@ def torment(kills: int, engine: str, count: int, seed: int, folder: Path) -> Out
     return outcome
 
 
-def _one_sweep(kills: int, engine: str, count: int, draw: random.Random, outcome: Outcome, place: Path) -> None:
+def _one_sweep(
+    kills: int, engine: str, count: int, draw: random.Random, outcome: Outcome, place: Path
+) -> None:
     """Run one sweep to its end, killing on the way while kills are left."""
     while True:
         process = _start(engine, count, place)
         while process.poll() is None and sum(outcome.kills.values()) < kills:
             try:
-                process.wait(draw.uniform(0.0, 2.0 + (3.0 if engine == "dask" else 0.0) + 0.003 * count))
+                process.wait(
+                    draw.uniform(0.0, 2.0 + (3.0 if engine == "dask" else 0.0) + 0.003 * count)
+                )
                 break
             except subprocess.TimeoutExpired:
                 pass
@@ -136,7 +147,9 @@ def _one_sweep(kills: int, engine: str, count: int, draw: random.Random, outcome
             elif target == "submitter":
                 process.kill()
             else:
-                process.send_signal(signal.SIGSTOP)  # so that it starts nothing between listing and killing
+                process.send_signal(
+                    signal.SIGSTOP
+                )  # so that it starts nothing between listing and killing
                 kill([*descendants(process.pid), process.pid])
             outcome.kills[target] += 1
         if process.wait() == 0:
@@ -149,8 +162,22 @@ def _one_sweep(kills: int, engine: str, count: int, draw: random.Random, outcome
 
 def _start(engine: str, count: int, place: Path) -> subprocess.Popen[bytes]:
     with _said(place).open("wb") as said:
-        return subprocess.Popen([sys.executable, "-m", "tests.study.crashes", "--work", str(place), "--engine", engine,
-                                 "--cases", str(count)], cwd=ROOT, stdin=subprocess.DEVNULL, stderr=said)
+        return subprocess.Popen(
+            [
+                sys.executable,
+                "-m",
+                "tests.study.crashes",
+                "--work",
+                str(place),
+                "--engine",
+                engine,
+                "--cases",
+                str(count),
+            ],
+            cwd=ROOT,
+            stdin=subprocess.DEVNULL,
+            stderr=said,
+        )
 
 
 def _said(place: Path) -> Path:
@@ -159,7 +186,8 @@ def _said(place: Path) -> Path:
 
 
 def _read_on(place: Path, count: int, stop: threading.Event, outcome: Outcome) -> None:
-    """Read a living store again and again: every read must succeed, and rows may never get fewer."""
+    """Read a living store again and again: every read must succeed, and rows may never get
+    fewer."""
     rows = 0
     while not stop.wait(0.3):
         try:
@@ -174,7 +202,8 @@ def _read_on(place: Path, count: int, stop: threading.Event, outcome: Outcome) -
 
 
 def torment_slurm(kills: int, count: int, seed: int, folder: Path) -> Outcome:
-    """The same with job arrays: kill running elements (their processes) or the submitting process."""
+    """The same with job arrays: kill running elements (their processes) or the submitting
+    process."""
     draw, outcome = random.Random(seed), Outcome()
     reference = digest(sweep(cases(count), paced, executor=2, store=folder / "reference"))
     while sum(outcome.kills.values()) < kills:
@@ -209,7 +238,10 @@ def _elements() -> list[int]:
     found = []
     for entry in Path("/proc").iterdir():
         try:
-            if entry.name.isdigit() and b"trajopt.study.slurm import element" in (entry / "cmdline").read_bytes():
+            if (
+                entry.name.isdigit()
+                and b"trajopt.study.slurm import element" in (entry / "cmdline").read_bytes()
+            ):
                 found += [int(entry.name), *descendants(int(entry.name))]
         except OSError:
             continue
@@ -217,7 +249,9 @@ def _elements() -> list[int]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--kills", type=int, default=300)
     parser.add_argument("--engine", choices=("processes", "dask", "slurm"), default="processes")
     parser.add_argument("--cases", type=int, default=600)
@@ -226,20 +260,32 @@ def main() -> int:
     options = parser.parse_args()
     if options.work and options.engine == "slurm":
         table = tabled(cases(options.cases), paced, None, None)
-        submit(table, paced, open_store(options.work), limits=CaseLimits(60.0, 0), case_seconds=0.02,
-               options=SlurmOptions(elements=4, memory="500M"))
+        submit(
+            table,
+            paced,
+            open_store(options.work),
+            limits=CaseLimits(60.0, 0),
+            case_seconds=0.02,
+            options=SlurmOptions(elements=4, memory="500M"),
+        )
         return 0
     if options.work:
-        sweep(cases(options.cases), paced, executor=engine_named(options.engine), store=options.work)
+        sweep(
+            cases(options.cases), paced, executor=engine_named(options.engine), store=options.work
+        )
         return 0
     with tempfile.TemporaryDirectory(prefix="trajopt-crashes-") as folder:
         started = time.monotonic()
         if options.engine == "slurm":
             outcome = torment_slurm(options.kills, options.cases, options.seed, Path(folder))
         else:
-            outcome = torment(options.kills, options.engine, options.cases, options.seed, Path(folder))
-    print(f"{options.engine}: kills {dict(outcome.kills)}, {outcome.sweeps} sweeps of {options.cases} cases compared, "
-          f"{outcome.reads} reads, {len(outcome.faults)} faults, {time.monotonic() - started:.0f} s")
+            outcome = torment(
+                options.kills, options.engine, options.cases, options.seed, Path(folder)
+            )
+    print(
+        f"{options.engine}: kills {dict(outcome.kills)}, {outcome.sweeps} sweeps of {options.cases} cases compared, "
+        f"{outcome.reads} reads, {len(outcome.faults)} faults, {time.monotonic() - started:.0f} s"
+    )
     for fault in outcome.faults:
         print("FAULT", fault)
     return 1 if outcome.faults else 0

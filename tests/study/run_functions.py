@@ -34,8 +34,11 @@ def mixed(case: Case) -> dict[str, Any]:
     """``cheap`` with arrays, and an error now and then."""
     if case["x"] % 97 == 5:
         raise ValueError(f"x = {case['x']} is a bad number")
-    return {**cheap(case), "nested": {"text": f"case {case['x']}", "list": [1, 2.5]},
-            "track": np.arange(6.0).reshape(3, 2) * case["x"]}
+    return {
+        **cheap(case),
+        "nested": {"text": f"case {case['x']}", "list": [1, 2.5]},
+        "track": np.arange(6.0).reshape(3, 2) * case["x"],
+    }
 
 
 def paced_mixed(case: Case) -> dict[str, Any]:
@@ -61,7 +64,9 @@ def poisoned(case: Case) -> Any:
             while True:
                 pass
         case "deaf":
-            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM, signal.SIGINT, signal.SIGALRM})
+            signal.pthread_sigmask(
+                signal.SIG_BLOCK, {signal.SIGTERM, signal.SIGINT, signal.SIGALRM}
+            )
             ctypes.PyDLL(None).sleep(3600)  # in C, holding the interpreter lock
         case "memory":
             return {"square": float(np.ones(1 << 33).sum())}

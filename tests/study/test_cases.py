@@ -19,11 +19,21 @@ from trajopt.study.sweepfile import load_sweep
 
 ROOT = Path(__file__).resolve().parents[2]
 
-values = st.one_of(st.integers(-(2**62), 2**62), st.floats(allow_nan=False, allow_infinity=False), st.booleans(),
-                   st.text(max_size=5), st.none())
+values = st.one_of(
+    st.integers(-(2**62), 2**62),
+    st.floats(allow_nan=False, allow_infinity=False),
+    st.booleans(),
+    st.text(max_size=5),
+    st.none(),
+)
 
 
-@given(st.lists(st.fixed_dictionaries({"a": st.integers(-5, 5), "b": values}), min_size=1, max_size=20), st.randoms())
+@given(
+    st.lists(
+        st.fixed_dictionaries({"a": st.integers(-5, 5), "b": values}), min_size=1, max_size=20
+    ),
+    st.randoms(),
+)
 def test_identity_depends_on_content_only(cases: list[dict[str, Any]], random: Any) -> None:
     shuffled = list(cases)
     random.shuffle(shuffled)
@@ -36,8 +46,19 @@ def test_identity_sees_every_part() -> None:
     def ids(run: str = "m:f", problem: Any = None, code: str = "1", **case: Any) -> bytes:
         return bytes(case_table([case], identity_base(run, problem, code)).ids[0])
 
-    found = {ids(x=1), ids(x=2), ids(y=1), ids(x="1"), ids(x=True), ids(x=None), ids(x=[1]), ids(run="m:g", x=1),
-             ids(problem={"a": 1}, x=1), ids(code="2", x=1), ids(x=1, y=1)}
+    found = {
+        ids(x=1),
+        ids(x=2),
+        ids(y=1),
+        ids(x="1"),
+        ids(x=True),
+        ids(x=None),
+        ids(x=[1]),
+        ids(run="m:g", x=1),
+        ids(problem={"a": 1}, x=1),
+        ids(code="2", x=1),
+        ids(x=1, y=1),
+    }
     assert len(found) == 11
     assert ids(x=-0.0) == ids(x=0.0)
     assert ids(x=np.float64(0.1)) == ids(x=0.1)
@@ -63,17 +84,31 @@ def test_equal_cases_appear_once() -> None:
     assert [c["x"] for c in table.rows()] == [1, 2]
 
 
-@pytest.mark.parametrize("bad", [[{"x": 1}, {"y": 1}], [{"x": math.nan}], [{"x": object()}], [{"x": 2**70}], [3]])
+@pytest.mark.parametrize(
+    "bad", [[{"x": 1}, {"y": 1}], [{"x": math.nan}], [{"x": object()}], [{"x": 2**70}], [3]]
+)
 def test_bad_cases_are_refused(bad: Any) -> None:
     with pytest.raises(ArgumentError):
         case_table(bad)
 
 
 def test_product_zip_and_order() -> None:
-    columns = combined({"a": {"values": [1, 2]}, "b": {"values": [10, 20, 30], "zip": "g"},
-                        "c": {"values": ["x", "y", "z"], "zip": "g"}})
+    columns = combined(
+        {
+            "a": {"values": [1, 2]},
+            "b": {"values": [10, 20, 30], "zip": "g"},
+            "c": {"values": ["x", "y", "z"], "zip": "g"},
+        }
+    )
     rows = list(zip(*(columns[k].tolist() for k in "abc"), strict=True))
-    assert rows == [(1, 10, "x"), (1, 20, "y"), (1, 30, "z"), (2, 10, "x"), (2, 20, "y"), (2, 30, "z")]
+    assert rows == [
+        (1, 10, "x"),
+        (1, 20, "y"),
+        (1, 30, "z"),
+        (2, 10, "x"),
+        (2, 20, "y"),
+        (2, 30, "z"),
+    ]
 
 
 def test_ranges() -> None:
@@ -96,36 +131,76 @@ def test_random_draws_have_their_distribution_and_seed() -> None:
 
 @pytest.mark.parametrize("method", ["latin-hypercube", "sobol"])
 def test_joint_samples_fill_every_stratum(method: str) -> None:
-    columns = combined({}, {"method": method, "count": 64, "seed": 3,
-                            "axes": {"x": {"uniform": [0.0, 64.0]}, "y": {"uniform": [0.0, 64.0]}}})
+    columns = combined(
+        {},
+        {
+            "method": method,
+            "count": 64,
+            "seed": 3,
+            "axes": {"x": {"uniform": [0.0, 64.0]}, "y": {"uniform": [0.0, 64.0]}},
+        },
+    )
     for name in "xy":
         assert sorted(np.floor(columns[name]).astype(int).tolist()) == list(range(64))
 
 
 def test_derived_and_excluded() -> None:
-    columns = with_derived(combined({"a.b": {"values": [1, 2, 3]}, "c": {"values": [0, 1]}}),
-                           {"d": "[a.b + c, 2 * a.b]"}, ["a.b == 2 and c > 0"])
+    columns = with_derived(
+        combined({"a.b": {"values": [1, 2, 3]}, "c": {"values": [0, 1]}}),
+        {"d": "[a.b + c, 2 * a.b]"},
+        ["a.b == 2 and c > 0"],
+    )
     assert columns["d"].tolist() == [[1, 2], [2, 2], [2, 4], [3, 6], [4, 6]]
 
 
-@pytest.mark.parametrize("axis", [{}, {"values": []}, {"range": [0, 1]}, {"log": [0, 1, 3]}, {"values": [1], "x": 2},
-                                  {"random": {"uniform": [1, 0], "count": 2, "seed": 0}},
-                                  {"random": {"uniform": [0, 1], "count": 2}}])
+@pytest.mark.parametrize(
+    "axis",
+    [
+        {},
+        {"values": []},
+        {"range": [0, 1]},
+        {"log": [0, 1, 3]},
+        {"values": [1], "x": 2},
+        {"random": {"uniform": [1, 0], "count": 2, "seed": 0}},
+        {"random": {"uniform": [0, 1], "count": 2}},
+    ],
+)
 def test_bad_axes_are_refused(axis: dict[str, Any]) -> None:
     with pytest.raises(ArgumentError):
         combined({"a": axis})
 
 
-@pytest.mark.parametrize(("text", "value"), [
-    ("1 + 2 * x ** 2", 19), ("-x if x > 5 else x / 2", 1.5), ("max(x, 10) % 4", 2),
-    ("not (x < 3) and 1 < x <= 3", True),
-    ("[sin(pi), x]", [math.sin(math.pi), 3]), ("p.q - 1", 6), ("'a' == 'a'", True)])
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 + 2 * x ** 2", 19),
+        ("-x if x > 5 else x / 2", 1.5),
+        ("max(x, 10) % 4", 2),
+        ("not (x < 3) and 1 < x <= 3", True),
+        ("[sin(pi), x]", [math.sin(math.pi), 3]),
+        ("p.q - 1", 6),
+        ("'a' == 'a'", True),
+    ],
+)
 def test_expressions(text: str, value: Any) -> None:
     assert evaluate(parse(text), {"x": 3, "p.q": 7}) == value
 
 
-@pytest.mark.parametrize("text", ["__import__('os')", "x.__class__", "(lambda: 1)()", "[i for i in x]", "open('f')",
-                                  "unknown", "x[0]", "1 / 0", "x +", "f'{x}'"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "__import__('os')",
+        "x.__class__",
+        "(lambda: 1)()",
+        "[i for i in x]",
+        "open('f')",
+        "unknown",
+        "x[0]",
+        "1 / 0",
+        "x +",
+        "f'{x}'",
+    ],
+)
 def test_expressions_run_no_code(text: str) -> None:
     with pytest.raises(ArgumentError):
         evaluate(parse(text), {"x": 3})
@@ -144,15 +219,21 @@ def sweep_file(folder: Path, text: str) -> Path:
     return file
 
 
-@pytest.mark.parametrize(("text", "words"), [
-    ("bad = 1", "bad"),
-    ('[axes."limits.frictoin"]\nvalues = [1.0]', "'friction'"),
-    ('[axes.height]\nvalues = [1.0]', "height"),
-    ('[axes."limits.friction"]\nvalues = [-1.0]', "greater than 0"),
-    ('[axes."run.optimiser"]\nvalues = ["pso"]', "run.optimizer"),
-    ('exclude = ["x >"]\n[axes."limits.friction"]\nvalues = [1.0]', "x >"),
-    ('exclude = ["limits.friction > 0"]\n[axes."limits.friction"]\nvalues = [1.0]', "at least one case"),
-])
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("bad = 1", "bad"),
+        ('[axes."limits.frictoin"]\nvalues = [1.0]', "'friction'"),
+        ("[axes.height]\nvalues = [1.0]", "height"),
+        ('[axes."limits.friction"]\nvalues = [-1.0]', "greater than 0"),
+        ('[axes."run.optimiser"]\nvalues = ["pso"]', "run.optimizer"),
+        ('exclude = ["x >"]\n[axes."limits.friction"]\nvalues = [1.0]', "x >"),
+        (
+            'exclude = ["limits.friction > 0"]\n[axes."limits.friction"]\nvalues = [1.0]',
+            "at least one case",
+        ),
+    ],
+)
 def test_wrong_sweep_files_are_told(tmp_path: Path, text: str, words: str) -> None:
     with pytest.raises(ProblemError, match=words):
         load_sweep(sweep_file(tmp_path, text))

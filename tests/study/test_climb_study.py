@@ -27,7 +27,11 @@ def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(climb_study, "run_climb", watched)
     row = plan.run(case)
     step = seen[0].step
-    assert (step.height, step.friction, step.torque) == (case["obstacle.height"], case["friction"], case["torque"])
+    assert (step.height, step.friction, step.torque) == (
+        case["obstacle.height"],
+        case["friction"],
+        case["torque"],
+    )
     assert row["climbed"] == float(run_climb(seen[0], case["engine"]).critical_up)
 
 

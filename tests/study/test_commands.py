@@ -49,7 +49,11 @@ def test_show_prints_the_traceback(store: Store) -> None:
 def test_export(store: Store, tmp_path: Path, name: str) -> None:
     file = tmp_path / name
     told("export", str(store.path), str(file))
-    read = {"csv": pd.read_csv, "parquet": pd.read_parquet, "jsonl": lambda f: pd.read_json(f, lines=True)}
+    read = {
+        "csv": pd.read_csv,
+        "parquet": pd.read_parquet,
+        "jsonl": lambda f: pd.read_json(f, lines=True),
+    }
     assert len(read[file.suffix[1:]](file)) == 100
 
 
@@ -76,9 +80,18 @@ def test_report_draws_a_case_of_a_problem_as_solve_does(tmp_path: Path) -> None:
     row = store.frame().iloc[0]
     out = tmp_path / "report"
     reported(str(file), row["case"][:10], "--store", str(store.path), "--out", str(out))
-    assert {"case.json", "summary.json", "path.png", "profile.png", "convergence.png", "control_points.csv",
-            "arrays.png"} <= {p.name for p in out.iterdir()}
-    assert json.loads((out / "summary.json").read_text())["cost"] == pytest.approx(row["cost"], rel=1e-12)
+    assert {
+        "case.json",
+        "summary.json",
+        "path.png",
+        "profile.png",
+        "convergence.png",
+        "control_points.csv",
+        "arrays.png",
+    } <= {p.name for p in out.iterdir()}
+    assert json.loads((out / "summary.json").read_text())["cost"] == pytest.approx(
+        row["cost"], rel=1e-12
+    )
     assert json.loads((out / "case.json").read_text())["limits.friction"] == row["limits.friction"]
     reported(str(out), "--out", str(tmp_path / "again"))
     assert (tmp_path / "again" / "path.png").stat().st_size > 5_000
@@ -94,4 +107,6 @@ def test_report_shows_what_a_function_returned(store: Store, tmp_path: Path) -> 
     assert np.loadtxt(tmp_path / "track.csv", delimiter=",").shape == (3, 2)
     failed = store.frame().query("status == 'error'")["case"].iloc[0]
     assert "case.json" in reported(str(store.path), failed, "--out", str(tmp_path / "failed"))
-    assert "bad number" in json.loads((tmp_path / "failed" / "case.json").read_text())["error_message"]
+    assert (
+        "bad number" in json.loads((tmp_path / "failed" / "case.json").read_text())["error_message"]
+    )

@@ -33,7 +33,9 @@ def test_heat_map_shows_means(frame: pd.DataFrame) -> None:
 def test_lines_show_medians(frame: pd.DataFrame, tmp_path: Path) -> None:
     figure = lines(frame, "a", "cost", "b")
     assert len(figure.axes[0].lines) == 3
-    np.testing.assert_allclose(figure.axes[0].lines[1].get_ydata(), 2 * np.arange(4) * 0.1, atol=0.01)
+    np.testing.assert_allclose(
+        figure.axes[0].lines[1].get_ydata(), 2 * np.arange(4) * 0.1, atol=0.01
+    )
     figure.savefig(tmp_path / "lines.png")
     assert (tmp_path / "lines.png").stat().st_size > 5_000
 
@@ -51,10 +53,22 @@ def test_lines_of_flags_show_shares_with_their_interval(frame: pd.DataFrame) -> 
 
 
 def test_climb_rates_are_drawn_as_they_are() -> None:
-    rows = [{"configuration": name, "obstacle.height": height, "friction": friction, "heading_error": error,
-             "torque": torque, "status": "done", "climbed": float(torque > 3.0 if name == "lateral" else height < 0.03)}
-            for name in ("lateral", "forward") for height in (0.02, 0.05) for friction in (0.3, 0.8)
-            for error in (-0.05, 0.0, 0.05) for torque in (2.0, 4.0)]
+    rows = [
+        {
+            "configuration": name,
+            "obstacle.height": height,
+            "friction": friction,
+            "heading_error": error,
+            "torque": torque,
+            "status": "done",
+            "climbed": float(torque > 3.0 if name == "lateral" else height < 0.03),
+        }
+        for name in ("lateral", "forward")
+        for height in (0.02, 0.05)
+        for friction in (0.3, 0.8)
+        for error in (-0.05, 0.0, 0.05)
+        for torque in (2.0, 4.0)
+    ]
     rows.append({**rows[0], "climbed": None})  # left physics: does not count
     frame = pd.DataFrame(rows)
     maps = rate_maps(frame)

@@ -27,7 +27,9 @@ def write(store: Store, cases: CaseTable, rows: list[Row], name: str = "chunk") 
     beside = array_table(rows, cases)
     if beside is not None:
         store.write_part("arrays", name, beside)
-    store.write_part("parts", name, row_table(fitted(rows, kinds), cases, parameter_kinds(cases), kinds, "host"))
+    store.write_part(
+        "parts", name, row_table(fitted(rows, kinds), cases, parameter_kinds(cases), kinds, "host")
+    )
 
 
 @pytest.fixture
@@ -41,8 +43,19 @@ def store(tmp_path: Path) -> Store:
 
 
 def test_rows_come_back(store: Store, cases: CaseTable) -> None:
-    write(store, cases, [Row(i, DONE, {"y": i * 0.5, "good": True, "v": [1.0, float(i)]},
-                             {"track": np.full((2, 3), float(i))}) for i in range(10)])
+    write(
+        store,
+        cases,
+        [
+            Row(
+                i,
+                DONE,
+                {"y": i * 0.5, "good": True, "v": [1.0, float(i)]},
+                {"track": np.full((2, 3), float(i))},
+            )
+            for i in range(10)
+        ],
+    )
     frame = store.frame()
     assert frame["case"].tolist() == sorted(i.decode() for i in cases.ids.tolist())
     assert (frame["y"] == frame["x"] / 2).all()
@@ -54,13 +67,23 @@ def test_rows_come_back(store: Store, cases: CaseTable) -> None:
 
 def test_parts_are_readable_as_they_are(store: Store, cases: CaseTable) -> None:
     write(store, cases, [Row(i, DONE, {"y": 1.0}, {}) for i in range(5)])
-    write(store, cases, [Row(i, ERROR, {"y": None}, {}, "E", "m", "t") for i in range(5, 10)], "other")
+    write(
+        store, cases, [Row(i, ERROR, {"y": None}, {}, "E", "m", "t") for i in range(5, 10)], "other"
+    )
     assert len(pd.read_parquet(store.path / "parts")) == 10
 
 
 def test_one_row_a_case_finished_before_failed_then_latest(store: Store, cases: CaseTable) -> None:
-    write(store, cases, [Row(0, DONE, {"y": 1.0}, {}, started=5.0), Row(1, ERROR, {}, {}, "E", started=5.0)])
-    write(store, cases, [Row(0, ERROR, {}, {}, "E", started=9.0), Row(1, ERROR, {}, {}, "F", started=9.0)])
+    write(
+        store,
+        cases,
+        [Row(0, DONE, {"y": 1.0}, {}, started=5.0), Row(1, ERROR, {}, {}, "E", started=5.0)],
+    )
+    write(
+        store,
+        cases,
+        [Row(0, ERROR, {}, {}, "E", started=9.0), Row(1, ERROR, {}, {}, "F", started=9.0)],
+    )
     write(store, cases, [Row(1, ERROR, {}, {}, "G", started=7.0)])
     by_case = store.frame().set_index("case")
     first, second = (i.decode() for i in cases.ids[:2].tolist())
@@ -73,13 +96,28 @@ def test_one_row_a_case_finished_before_failed_then_latest(store: Store, cases: 
 def test_names_of_results_do_not_hide_parameters(store: Store, cases: CaseTable) -> None:
     write(store, cases, [Row(0, DONE, {"x": 7.0, "status": "fine"}, {})])
     row = store.frame().iloc[0]
-    assert (row["x"], row["result.x"], row["status"], row["result.status"]) == (0, 7.0, DONE, "fine")
+    assert (row["x"], row["result.x"], row["status"], row["result.status"]) == (
+        0,
+        7.0,
+        DONE,
+        "fine",
+    )
 
 
 def test_compaction_keeps_rows_and_arrays(store: Store, cases: CaseTable) -> None:
     for i in range(10):
-        write(store, cases, [Row(i, DONE, {"y": float(i)}, {"a": np.array([float(i)])}, started=1.0)], f"c{i}")
-        write(store, cases, [Row(i, DONE, {"y": float(i)}, {"a": np.array([float(i)])}, started=2.0)], f"c{i}")
+        write(
+            store,
+            cases,
+            [Row(i, DONE, {"y": float(i)}, {"a": np.array([float(i)])}, started=1.0)],
+            f"c{i}",
+        )
+        write(
+            store,
+            cases,
+            [Row(i, DONE, {"y": float(i)}, {"a": np.array([float(i)])}, started=2.0)],
+            f"c{i}",
+        )
     before = store.table()
     assert store.compact() == (20, 1)
     assert store.table().equals(before)
@@ -126,7 +164,9 @@ def test_a_damaged_part_is_named(store: Store) -> None:
         store.table()
 
 
-@pytest.mark.parametrize("content", ['{"format": 0}', '{"format": 2, "kind": "trajopt sweep"}', "[]", "not json"])
+@pytest.mark.parametrize(
+    "content", ['{"format": 0}', '{"format": 2, "kind": "trajopt sweep"}', "[]", "not json"]
+)
 def test_other_formats_are_refused(tmp_path: Path, content: str) -> None:
     place = tmp_path / "store"
     open_store(place)
@@ -139,8 +179,11 @@ OLD = Path(__file__).resolve().parents[1] / "data" / "sweep" / "format_1"
 
 
 def test_a_store_of_an_older_version_is_read_and_goes_on(tmp_path: Path) -> None:
-    """Written by the first version of this package that had sweeps (commit ff2b1b9), with x = 3 an error."""
-    place = shutil.copytree(OLD, tmp_path / "store", ignore=shutil.ignore_patterns("temporary", "jobs"))
+    """Written by the first version of this package that had sweeps (commit ff2b1b9), with x = 3 an
+    error."""
+    place = shutil.copytree(
+        OLD, tmp_path / "store", ignore=shutil.ignore_patterns("temporary", "jobs")
+    )
     store = open_store(place, create=False)
     frame = store.frame()
     assert store.counts() == {"done": 5, "error": 1}
@@ -149,25 +192,37 @@ def test_a_store_of_an_older_version_is_read_and_goes_on(tmp_path: Path) -> None
     assert (good["square"] == good["x"] ** 2.0).all()
     row, arrays = store.case(good["case"].iloc[0])
     np.testing.assert_array_equal(arrays["track"], np.arange(6.0).reshape(3, 2) * row["x"])
-    again = sweep([{"x": i, "friction": 0.1 * i, "kind": "ab"[i % 2], "place": [0.5, i]} for i in range(6)], noop,
-                  executor=1, store=place)
-    assert again.counts() == {"done": 11, "error": 1}  # another function: other cases, in one table with the old ones
+    again = sweep(
+        [{"x": i, "friction": 0.1 * i, "kind": "ab"[i % 2], "place": [0.5, i]} for i in range(6)],
+        noop,
+        executor=1,
+        store=place,
+    )
+    assert again.counts() == {
+        "done": 11,
+        "error": 1,
+    }  # another function: other cases, in one table with the old ones
     again.compact()
     assert len(again.frame()) == 12
 
 
 @pytest.mark.parametrize("version", [0, 2, "1"])
-def test_a_store_of_another_format_is_refused_and_left_alone(tmp_path: Path, version: object) -> None:
+def test_a_store_of_another_format_is_refused_and_left_alone(
+    tmp_path: Path, version: object
+) -> None:
     place = shutil.copytree(OLD, tmp_path / "store")
     (place / "store.json").write_text(json.dumps({"format": version, "kind": "trajopt sweep"}))
     before = {p: p.read_bytes() for p in place.rglob("*") if p.is_file()}
-    with pytest.raises(StoreError, match="but this version reads and writes format 1; use the trajopt version"):
+    with pytest.raises(
+        StoreError, match="but this version reads and writes format 1; use the trajopt version"
+    ):
         sweep([{"x": 1}], noop, executor=1, store=place)
     assert {p: p.read_bytes() for p in place.rglob("*") if p.is_file()} == before
 
 
 def late(case: Case) -> dict[str, Any]:
-    """A column that only some late cases have (none of the three sampled ones), and an error at the front."""
+    """A column that only some late cases have (none of the three sampled ones), and an error at the
+    front."""
     if case["x"] == 0:
         raise ValueError("first")
     row: dict[str, Any] = {"square": case["x"] ** 2.0}
@@ -177,7 +232,12 @@ def late(case: Case) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def uneven(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """A finished sweep whose parts did not all know all columns when they were written."""
-    store = sweep([{"x": i} for i in range(100)], late, executor=1, store=tmp_path_factory.mktemp("uneven") / "store")
+    store = sweep(
+        [{"x": i} for i in range(100)],
+        late,
+        executor=1,
+        store=tmp_path_factory.mktemp("uneven") / "store",
+    )
     return sweep([{"x": i} for i in range(200, 203)], noop, executor=1, store=store)
 
 
@@ -196,9 +256,14 @@ def test_polars_reads_the_parts_as_they_are(uneven: Store) -> None:
 
 def test_duckdb_reads_the_parts_as_they_are(uneven: Store) -> None:
     duckdb = pytest.importorskip("duckdb", reason="duckdb is not installed")
-    found = duckdb.sql(f"select status, count(*), sum(late), sum(square) from '{uneven.path}/parts/*.parquet' "
-                       "group by status order by status").fetchall()
-    assert found == [(DONE, 102, sum(range(90, 99)) / 2, float(sum(x * x for x in range(100)))), (ERROR, 1, None, None)]
+    found = duckdb.sql(
+        f"select status, count(*), sum(late), sum(square) from '{uneven.path}/parts/*.parquet' "
+        "group by status order by status"
+    ).fetchall()
+    assert found == [
+        (DONE, 102, sum(range(90, 99)) / 2, float(sum(x * x for x in range(100)))),
+        (ERROR, 1, None, None),
+    ]
 
 
 def test_kinds_that_exclude_each_other_become_text(store: Store, cases: CaseTable) -> None:
@@ -220,11 +285,16 @@ def test_other_directories_are_refused(tmp_path: Path) -> None:
 
 
 def test_format_on_disk(store: Store) -> None:
-    assert json.loads((store.path / "store.json").read_text()) == {"format": 1, "kind": "trajopt sweep"}
+    assert json.loads((store.path / "store.json").read_text()) == {
+        "format": 1,
+        "kind": "trajopt sweep",
+    }
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
-def test_full_disk_leaves_the_store_whole(store: Store, cases: CaseTable, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_leaves_the_store_whole(
+    store: Store, cases: CaseTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
     write(store, cases, [Row(0, DONE, {}, {})])
     full = open  # every write of a part goes to a device without space
 

@@ -31,13 +31,34 @@ from trajopt.study.host import RunLoadError
 from trajopt.study.store import StoreError, open_store
 from trajopt.study.sweeps import sweep
 
-KINDS = ("raise", "exit", "hard exit", "segfault", "hang", "spin", "deaf", "memory", "print", "unserialisable",
-         "lambda", "kind")
-EXPECTED = {"raise": ("error", "RuntimeError"), "exit": ("error", "SystemExit"), "hard exit": ("crashed", "WorkerDied"),
-            "segfault": ("crashed", "WorkerDied"), "hang": ("timeout", "TimeLimit"), "spin": ("timeout", "TimeLimit"),
-            "deaf": ("timeout", "TimeLimit"), "memory": ("error", "MemoryError"), "print": ("done", None),
-            "unserialisable": ("error", "ArgumentError"), "lambda": ("error", "ArgumentError"),
-            "kind": ("error", "ResultKindError")}
+KINDS = (
+    "raise",
+    "exit",
+    "hard exit",
+    "segfault",
+    "hang",
+    "spin",
+    "deaf",
+    "memory",
+    "print",
+    "unserialisable",
+    "lambda",
+    "kind",
+)
+EXPECTED = {
+    "raise": ("error", "RuntimeError"),
+    "exit": ("error", "SystemExit"),
+    "hard exit": ("crashed", "WorkerDied"),
+    "segfault": ("crashed", "WorkerDied"),
+    "hang": ("timeout", "TimeLimit"),
+    "spin": ("timeout", "TimeLimit"),
+    "deaf": ("timeout", "TimeLimit"),
+    "memory": ("error", "MemoryError"),
+    "print": ("done", None),
+    "unserialisable": ("error", "ArgumentError"),
+    "lambda": ("error", "ArgumentError"),
+    "kind": ("error", "ResultKindError"),
+}
 
 
 def test_the_same_table_whatever_the_workers(tmp_path: Path) -> None:
@@ -46,7 +67,9 @@ def test_the_same_table_whatever_the_workers(tmp_path: Path) -> None:
     assert one.counts() == {"done": 296, "error": 4}
     assert digest(one) == digest(two)
     with ThreadPoolExecutor(2) as threads:
-        assert digest(sweep(cases(300), mixed, executor=threads, store=tmp_path / "threads")) == digest(one)
+        assert digest(
+            sweep(cases(300), mixed, executor=threads, store=tmp_path / "threads")
+        ) == digest(one)
 
 
 @pytest.mark.slow
@@ -64,8 +87,12 @@ def test_dask_listens_on_loopback_only() -> None:
     with dask_local(1).start() as executor:
         executor.submit(abs, -1).result()
         me = psutil.Process()
-        found = {connection.laddr.ip for process in (me, *me.children(recursive=True))
-                 for connection in process.net_connections(kind="inet") if connection.status == psutil.CONN_LISTEN}
+        found = {
+            connection.laddr.ip
+            for process in (me, *me.children(recursive=True))
+            for connection in process.net_connections(kind="inet")
+            if connection.status == psutil.CONN_LISTEN
+        }
     assert found == {"127.0.0.1"}
 
 
@@ -73,14 +100,23 @@ def test_dask_listens_on_loopback_only() -> None:
 def test_bad_cases_cost_their_own_row(tmp_path: Path) -> None:
     many: list[dict[str, Any]] = [{"x": i, "kind": ""} for i in range(60)]
     many += [{"x": 100 + i, "kind": kind} for i, kind in enumerate(KINDS)]
-    store = sweep(many, poisoned, executor=2, store=tmp_path / "store", time_limit=1.0, memory_limit=4_000_000_000)
+    store = sweep(
+        many,
+        poisoned,
+        executor=2,
+        store=tmp_path / "store",
+        time_limit=1.0,
+        memory_limit=4_000_000_000,
+    )
     frame = store.frame()
     good = frame[frame["kind"] == ""]
     assert (good["status"] == "done").all()
     assert (good["square"] == good["x"] ** 2.0).all()
     found = frame.set_index("kind").loc[list(KINDS)]
-    told = {kind: (row["status"], row["error"] if isinstance(row["error"], str) else None)
-            for kind, row in found.iterrows()}
+    told = {
+        kind: (row["status"], row["error"] if isinstance(row["error"], str) else None)
+        for kind, row in found.iterrows()
+    }
     assert told == EXPECTED
     assert "string_at" in found.loc["segfault", "error_traceback"]
     assert "on purpose" in found.loc["raise", "error_traceback"]
@@ -130,13 +166,18 @@ def test_retry_failed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_stopping_keeps_finished_cases(tmp_path: Path, number: int) -> None:
-    # A shell that starts the tests in the background makes them ignore Ctrl-C; the program under test must not.
-    program = (f"import signal; signal.signal(signal.SIGTERM, signal.default_int_handler)\n"
-               f"signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-               f"from tests.study.crashes import cases; from tests.study.run_functions import paced\n"
-               f"from trajopt.study.sweeps import sweep\n"
-               f"sweep(cases(4000), paced, executor=2, store={str(tmp_path / 'store')!r})")
-    process = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    # A shell that starts the tests in the background makes them ignore Ctrl-C; the program under
+    # test must not.
+    program = (
+        f"import signal; signal.signal(signal.SIGTERM, signal.default_int_handler)\n"
+        f"signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        f"from tests.study.crashes import cases; from tests.study.run_functions import paced\n"
+        f"from trajopt.study.sweeps import sweep\n"
+        f"sweep(cases(4000), paced, executor=2, store={str(tmp_path / 'store')!r})"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program], cwd=ROOT, stderr=subprocess.PIPE, text=True
+    )
     store = open_store(tmp_path / "store")
     for _ in range(600):
         if len(store.parts()) > 1:
@@ -154,9 +195,11 @@ def test_stopping_keeps_finished_cases(tmp_path: Path, number: int) -> None:
 
 
 def test_two_sweeps_on_one_store(tmp_path: Path) -> None:
-    program = (f"from tests.study.crashes import cases; from tests.study.run_functions import paced\n"
-               f"from trajopt.study.sweeps import sweep\n"
-               f"sweep(cases(200), paced, executor=1, store={str(tmp_path / 'store')!r})")
+    program = (
+        f"from tests.study.crashes import cases; from tests.study.run_functions import paced\n"
+        f"from trajopt.study.sweeps import sweep\n"
+        f"sweep(cases(200), paced, executor=1, store={str(tmp_path / 'store')!r})"
+    )
     both = [subprocess.Popen([sys.executable, "-c", program], cwd=ROOT) for _ in range(2)]
     assert [p.wait(timeout=120) for p in both] == [0, 0]
     store = open_store(tmp_path / "store", create=False)
@@ -220,18 +263,31 @@ def test_columns_and_bad_arguments(tmp_path: Path) -> None:
 def test_workers_that_cannot_start_are_an_error_with_a_reason(tmp_path: Path) -> None:
     """A script without a guard: its workers run it again instead of starting."""
     script = tmp_path / "script.py"
-    script.write_text("from pathlib import Path\nfrom trajopt.study.sweeps import sweep\n"
-                      "def run(case): return 1.0\n"
-                      f"sweep([{{'x': 1}}], run, executor=1, store=Path({str(tmp_path / 'store')!r}))\n")
-    done = subprocess.run([sys.executable, str(script)], cwd=ROOT, capture_output=True, text=True, timeout=120,
-                          check=False, env={**os.environ, "PYTHONPATH": str(ROOT)})
+    script.write_text(
+        "from pathlib import Path\nfrom trajopt.study.sweeps import sweep\n"
+        "def run(case): return 1.0\n"
+        f"sweep([{{'x': 1}}], run, executor=1, store=Path({str(tmp_path / 'store')!r}))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
     assert done.returncode == 1
     assert "died at 6 starts in a row" in done.stderr.strip().splitlines()[-1]
     assert 'if __name__ == "__main__"' in done.stderr.strip().splitlines()[-1]
 
 
 def test_an_engine_that_fails_a_few_starts_is_tried_again(tmp_path: Path) -> None:
-    failures = [RuntimeError("a process of the cluster was killed"), asyncio.CancelledError(), OSError("no answer")]
+    failures = [
+        RuntimeError("a process of the cluster was killed"),
+        asyncio.CancelledError(),
+        OSError("no answer"),
+    ]
 
     @contextmanager
     def start() -> Iterator[Executor]:
@@ -261,7 +317,8 @@ with open(sys.argv[1], "r+b") as file:
 
 
 def test_progress_is_never_read_half_written(tmp_path: Path) -> None:
-    """A start time of zero would be a case that runs since the machine was started, and would be ended for it."""
+    """A start time of zero would be a case that runs since the machine was started, and would be
+    ended for it."""
     file = tmp_path / "progress"
     file.write_bytes(bytes(PROGRESS.size))
     with file.open("r+b") as stream:

@@ -13,12 +13,23 @@ NAN = float("nan")
 
 
 def rear_cog_robot(friction_height: float = 0.215) -> Platform:
-    """Differential drive: axle at x = 0, casters at x = -0.35, centre of gravity 0.132 m behind the axle."""
-    body = Body(120.0, 8.0, (-0.132, 0.0, friction_height),
-                ((0.0, 0.2), (0.0, -0.2), (-0.35, 0.15), (-0.35, -0.15)), (NAN,) * 4,
-                (True, True, False, False))
-    return differential_platform("rear-cog", half_track=0.2, radius=0.12, body=body,
-                                 footprint=((0.2, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.2, -0.3)))
+    """Differential drive: axle at x = 0, casters at x = -0.35, centre of gravity 0.132 m behind the
+    axle."""
+    body = Body(
+        120.0,
+        8.0,
+        (-0.132, 0.0, friction_height),
+        ((0.0, 0.2), (0.0, -0.2), (-0.35, 0.15), (-0.35, -0.15)),
+        (NAN,) * 4,
+        (True, True, False, False),
+    )
+    return differential_platform(
+        "rear-cog",
+        half_track=0.2,
+        radius=0.12,
+        body=body,
+        footprint=((0.2, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.2, -0.3)),
+    )
 
 
 ROBOTS = {"loc8": loc8(), "rear_cog": rear_cog_robot()}
@@ -54,20 +65,32 @@ def limit(kind: str, **changes: object):
 def random_path(rng: np.random.Generator, *, free_heading: bool, knots: int) -> Path:
     """A path that wanders forward, so that it never doubles back on itself."""
     steps = np.cumsum(rng.uniform(-0.8, 0.8, knots - 1))
-    points = np.vstack([[0.0, 0.0], np.cumsum(np.column_stack([np.cos(steps), np.sin(steps)])
-                                              * rng.uniform(0.4, 1.5, (knots - 1, 1)), axis=0)])
+    points = np.vstack(
+        [
+            [0.0, 0.0],
+            np.cumsum(
+                np.column_stack([np.cos(steps), np.sin(steps)])
+                * rng.uniform(0.4, 1.5, (knots - 1, 1)),
+                axis=0,
+            ),
+        ]
+    )
     heading = np.cumsum(rng.uniform(-0.8, 0.8, knots)) if free_heading else None
     return Path.through(points, heading=heading, turning_length=0.49)
 
 
 def random_limits(rng: np.random.Generator) -> list:
     """Wheel, slip, speed and acceleration limits of random size; tip now and then."""
-    limits = [limit("speed", largest=rng.uniform(0.3, 2.0)),
-              limit("wheel_speed", largest=rng.uniform(3.0, 20.0)),
-              limit("wheel_acceleration", largest=rng.uniform(3.0, 30.0)),
-              limit("slip", friction=rng.uniform(0.1, 0.9))]
+    limits = [
+        limit("speed", largest=rng.uniform(0.3, 2.0)),
+        limit("wheel_speed", largest=rng.uniform(3.0, 20.0)),
+        limit("wheel_acceleration", largest=rng.uniform(3.0, 30.0)),
+        limit("slip", friction=rng.uniform(0.1, 0.9)),
+    ]
     if rng.random() < 0.5:
-        limits.append(limit("acceleration", forward=rng.uniform(0.2, 2.0), braking=rng.uniform(0.2, 2.0)))
+        limits.append(
+            limit("acceleration", forward=rng.uniform(0.2, 2.0), braking=rng.uniform(0.2, 2.0))
+        )
     if rng.random() < 0.5:
         limits.append(limit("tip"))
     return limits

@@ -47,13 +47,18 @@ def test_compiled_is_toppra_on_random_paths_and_limits(first):
     infeasible = 0
     for seed in range(first, first + BATCH):
         stages, start, end = random_stages(seed, points=60)
-        ours, theirs = outcome(compiled_profile, stages, start, end), outcome(toppra_profile, stages, start, end)
+        ours, theirs = (
+            outcome(compiled_profile, stages, start, end),
+            outcome(toppra_profile, stages, start, end),
+        )
         if isinstance(ours, tuple):
             infeasible += 1
             assert ours == theirs, seed
             continue
         assert duration(stages, ours) == pytest.approx(duration(stages, theirs), rel=1e-6), seed
-        np.testing.assert_allclose(ours, theirs, atol=1e-5 * max(1.0, ours.max()), err_msg=str(seed))
+        np.testing.assert_allclose(
+            ours, theirs, atol=1e-5 * max(1.0, ours.max()), err_msg=str(seed)
+        )
     assert infeasible < BATCH // 5
 
 
@@ -61,9 +66,12 @@ def test_compiled_is_toppra_on_random_paths_and_limits(first):
 def test_bounds_is_compiled_where_only_bounds_act(seed):
     rng = np.random.default_rng(seed)
     path = random_path(rng, free_heading=False, knots=5)
-    limits = [limit("acceleration", forward=rng.uniform(0.2, 2), braking=rng.uniform(0.2, 2)), limit("speed"),
-              limit("yaw_rate", largest=rng.uniform(0.2, 1.0)),
-              limit("speed_zones", zones=((0.5, 1.0, rng.uniform(0.2, 1.0)),))]
+    limits = [
+        limit("acceleration", forward=rng.uniform(0.2, 2), braking=rng.uniform(0.2, 2)),
+        limit("speed"),
+        limit("yaw_rate", largest=rng.uniform(0.2, 1.0)),
+        limit("speed_zones", zones=((0.5, 1.0, rng.uniform(0.2, 1.0)),)),
+    ]
     stages = assemble(sample_path(path, np.linspace(0, path.length, 301)), limits, None)
     assert only_bounds(stages)
     assert pick_engine("auto", stages) == "bounds"
@@ -98,14 +106,21 @@ def clarabel_profile(stages: Stages, start: float, end: float) -> np.ndarray:
     size = 2 * n + m
     blocks, right = [], []
     ends = sparse.csc_matrix((np.ones(2), ([0, 1], [0, n - 1])), shape=(2, size))
-    for side in (0, 1):  # rows at the left and right end of each interval, s'' = (x_(i+1) - x_i)/(2 d)
+    for side in (
+        0,
+        1,
+    ):  # rows at the left and right end of each interval, s'' = (x_(i+1) - x_i)/(2 d)
         a, b, c = (v[side : m + side] for v in (stages.a, stages.b, stages.c))
         for r in range(a.shape[1]):
             here, there = -a[:, r] / (2 * d), a[:, r] / (2 * d)
             here, there = (here + b[:, r], there) if side == 0 else (here, there + b[:, r])
             i = np.arange(m)
-            blocks.append(sparse.csc_matrix((np.concatenate([here, there]),
-                                             (np.tile(i, 2), np.concatenate([i, i + 1]))), shape=(m, size)))
+            blocks.append(
+                sparse.csc_matrix(
+                    (np.concatenate([here, there]), (np.tile(i, 2), np.concatenate([i, i + 1]))),
+                    shape=(m, size),
+                )
+            )
             right.append(c[:, r])
     blocks.append(sparse.hstack([sparse.eye(n), sparse.csc_matrix((n, n + m))]).tocsc())
     right.append(np.minimum(stages.sd2_max, 1e4))
@@ -123,12 +138,17 @@ def clarabel_profile(stages: Stages, start: float, end: float) -> np.ndarray:
     blocks.append(sparse.csc_matrix((values, (rows, columns)), shape=(len(cone_rows), size)))
     matrix = sparse.vstack([ends, *blocks]).tocsc()
     offsets = np.concatenate([[start, end], *right, cone_right])
-    cones = [clarabel.ZeroConeT(2), clarabel.NonnegativeConeT(inequality),
-             *[clarabel.SecondOrderConeT(3) for _ in range(n + m)]]
+    cones = [
+        clarabel.ZeroConeT(2),
+        clarabel.NonnegativeConeT(inequality),
+        *[clarabel.SecondOrderConeT(3) for _ in range(n + m)],
+    ]
     cost = np.concatenate([np.zeros(2 * n), 2 * d])
     options = clarabel.DefaultSettings()
     options.verbose = False
-    solver = clarabel.DefaultSolver(sparse.csc_matrix((size, size)), cost, matrix, offsets, cones, options)
+    solver = clarabel.DefaultSolver(
+        sparse.csc_matrix((size, size)), cost, matrix, offsets, cones, options
+    )
     return np.array(solver.solve().x)[:n]
 
 
@@ -149,7 +169,9 @@ def test_a_batch_is_its_members_and_marks_the_impossible_ones():
         members.append(assemble(sample_path(path, np.linspace(0, path.length, 80)), limits, robot))
     start = np.zeros(6)
     start[4] = 1e4  # nothing brakes from 100 m/s
-    s, a, b, c, top = (np.stack([getattr(m, f) for m in members]) for f in ("s", "a", "b", "c", "sd2_max"))
+    s, a, b, c, top = (
+        np.stack([getattr(m, f) for m in members]) for f in ("s", "a", "b", "c", "sd2_max")
+    )
     sd2, failed = fastest_profiles(s, a, b, c, top, start, np.zeros(6))
     for k, member in enumerate(members):
         if k == 4:

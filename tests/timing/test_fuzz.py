@@ -1,4 +1,5 @@
-"""Whatever comes in, time scaling gives a motion that holds or an error that names limit and place."""
+"""Whatever comes in, time scaling gives a motion that holds or an error that names limit and
+place."""
 
 from __future__ import annotations
 
@@ -39,13 +40,19 @@ def random_points(rng: np.random.Generator) -> np.ndarray:
 
 def random_set(rng: np.random.Generator) -> list[Limit]:
     size = 10.0 ** rng.uniform(-3, 2, 8)
-    choices = [lambda: limit("speed", largest=size[0]), lambda: limit("yaw_rate", largest=size[1]),
-               lambda: limit("acceleration", forward=size[2], braking=size[3]),
-               lambda: limit("wheel_speed", largest=10 * size[4]),
-               lambda: limit("wheel_acceleration", largest=10 * size[5]),
-               lambda: limit("slip", friction=min(size[6], 3.0), per_wheel=bool(rng.random() < 0.3)),
-               lambda: limit("tip"), lambda: limit("speed_zones", zones=((0.1, 0.4, size[7]),)),
-               lambda: limit("speed_profile", places=(0.0, 0.5, 1.0), speeds=tuple(rng.choice([0, 0.5, 2], 3)))]
+    choices = [
+        lambda: limit("speed", largest=size[0]),
+        lambda: limit("yaw_rate", largest=size[1]),
+        lambda: limit("acceleration", forward=size[2], braking=size[3]),
+        lambda: limit("wheel_speed", largest=10 * size[4]),
+        lambda: limit("wheel_acceleration", largest=10 * size[5]),
+        lambda: limit("slip", friction=min(size[6], 3.0), per_wheel=bool(rng.random() < 0.3)),
+        lambda: limit("tip"),
+        lambda: limit("speed_zones", zones=((0.1, 0.4, size[7]),)),
+        lambda: limit(
+            "speed_profile", places=(0.0, 0.5, 1.0), speeds=tuple(rng.choice([0, 0.5, 2], 3))
+        ),
+    ]
     return [choices[k]() for k in rng.choice(len(choices), int(rng.integers(1, 6)), replace=False)]
 
 
@@ -54,10 +61,14 @@ def attempt(rng: np.random.Generator, extra: dict) -> Trajectory | ArgumentError
     try:
         points = random_points(rng)
         free = points.shape[1] == 2 and rng.random() < 0.4
-        path = Path.through(points, heading=rng.normal(0, 1, len(points)) if free else None, turning_length=0.49)
+        path = Path.through(
+            points, heading=rng.normal(0, 1, len(points)) if free else None, turning_length=0.49
+        )
         if rng.random() < 0.2:
             extra["stops"] = [rng.uniform(0, 1.2) * path.length]
-        return time_scale(path, random_set(rng), robot=ROBOTS["loc8" if free else "rear_cog"], **extra)
+        return time_scale(
+            path, random_set(rng), robot=ROBOTS["loc8" if free else "rear_cog"], **extra
+        )
     except (ArgumentError, InfeasibleError) as error:
         return error
 
@@ -66,7 +77,10 @@ def attempt(rng: np.random.Generator, extra: dict) -> Trajectory | ArgumentError
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_motion_that_holds_or_an_error_with_limit_and_place(seed):
     rng = np.random.default_rng(seed)
-    extra: dict[str, object] = {"gridpoints": 40, "engine": rng.choice(["auto", "compiled", "linear", "segments"])}
+    extra: dict[str, object] = {
+        "gridpoints": 40,
+        "engine": rng.choice(["auto", "compiled", "linear", "segments"]),
+    }
     if rng.random() < 0.4:
         extra["start_speed"] = float(rng.choice([0.3, 3.0, *ODD]))
     if rng.random() < 0.3:
@@ -88,11 +102,15 @@ def test_a_motion_that_holds_or_an_error_with_limit_and_place(seed):
     assert min(result.margins().values()) >= -1e-9
     d = result.path.position(np.linspace(result.path.start, result.path.end, 2001), 1)
     d = d[:, :2] / np.hypot(d[:, 0], d[:, 1])[:, None]
-    if result.path.heading is None:  # nowhere does the direction of travel turn round between neighbours
+    if (
+        result.path.heading is None
+    ):  # nowhere does the direction of travel turn round between neighbours
         assert np.sum(d[1:] * d[:-1], axis=1).min() > -0.9999
     state = result.at(np.linspace(0, result.duration, 7))
     for values in (state.pose, state.twist, state.wheel_angles, state.wheel_speeds):
         assert np.all(np.isfinite(values))
     if result.engine != "linear":
         asked = [extra.get("start_speed", 0.0), extra.get("end_speed", 0.0)]
-        np.testing.assert_allclose(result.sd[[0, -1]] * result.slowdown, asked, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(
+            result.sd[[0, -1]] * result.slowdown, asked, rtol=1e-6, atol=1e-9
+        )

@@ -1,4 +1,5 @@
-"""A bound below the current speed: refused with a place, or braked into as fast as the other limits allow."""
+"""A bound below the current speed: refused with a place, or braked into as fast as the other limits
+allow."""
 
 from __future__ import annotations
 
@@ -15,8 +16,11 @@ BRAKING = 0.8
 
 
 def limits(zone: tuple[float, float, float]) -> list:
-    return [limit("speed", largest=2.0), limit("acceleration", forward=0.5, braking=BRAKING),
-            limit("speed_zones", zones=(zone,))]
+    return [
+        limit("speed", largest=2.0),
+        limit("acceleration", forward=0.5, braking=BRAKING),
+        limit("speed_zones", zones=(zone,)),
+    ]
 
 
 @pytest.mark.parametrize("engine", ["bounds", "compiled", "toppra"])
@@ -39,8 +43,12 @@ def test_a_zone_that_appears_is_braked_into(engine, zone):
 
 
 def test_speed_itself_above_its_limit():
-    motion = time_scale(LINE, [limit("speed", largest=1.0), limit("acceleration", forward=0.5, braking=0.8)],
-                        start_speed=1.4, too_fast="brake")
+    motion = time_scale(
+        LINE,
+        [limit("speed", largest=1.0), limit("acceleration", forward=0.5, braking=0.8)],
+        start_speed=1.4,
+        too_fast="brake",
+    )
     assert motion.sd[0] * motion.slowdown == pytest.approx(1.4, rel=1e-6)
     assert motion.sd[motion.s > 0.7].max() <= 1.0 + 1e-9
 
@@ -57,8 +65,13 @@ def test_what_braking_cannot_reach_stays_infeasible():
     with pytest.raises(InfeasibleError, match="acceleration"):  # 1.5 m/s needs 1.4 m to stop
         time_scale(short, limits((0.0, 0.4, 0.4)), start_speed=1.5, too_fast="brake")
     with pytest.raises(InfeasibleError) as caught:  # a bend that slips at this speed
-        time_scale(PATHS["hairpin"], [limit("speed", largest=1.0), limit("slip", friction=0.3)],
-                   robot=ROBOTS["rear_cog"], start_speed=6.0, too_fast="brake")
+        time_scale(
+            PATHS["hairpin"],
+            [limit("speed", largest=1.0), limit("slip", friction=0.3)],
+            robot=ROBOTS["rear_cog"],
+            start_speed=6.0,
+            too_fast="brake",
+        )
     assert caught.value.limit == "slip"
     with pytest.raises(ArgumentError, match="too_fast"):
         time_scale(LINE, limits((0.0, 1.0, 0.4)), too_fast="hope")
@@ -66,7 +79,8 @@ def test_what_braking_cannot_reach_stays_infeasible():
 
 @pytest.mark.parametrize("seed", range(20))
 def test_random_zones_in_front_of_random_motions(seed):
-    """From a state of a valid motion a zone appears: braking into it exists, holds, and is never faster."""
+    """From a state of a valid motion a zone appears: braking into it exists, holds, and is never
+    faster."""
     rng = np.random.default_rng(seed)
     path = random_path(rng, free_heading=False, knots=5)
     used = [*random_limits(rng), limit("acceleration", name="push", forward=1.0, braking=1.0)]
@@ -75,8 +89,13 @@ def test_random_zones_in_front_of_random_motions(seed):
         plain = time_scale(path, used, robot=ROBOTS["rear_cog"], start_speed=start)
     except InfeasibleError:
         return  # too fast for the path's own limits, whatever appears
-    zone = limit("speed_zones", zones=((0.0, rng.uniform(0.2, 0.9) * path.length, rng.uniform(0.1, 0.8) * start),))
-    braked = time_scale(path, [*used, zone], robot=ROBOTS["rear_cog"], start_speed=start, too_fast="brake")
+    zone = limit(
+        "speed_zones",
+        zones=((0.0, rng.uniform(0.2, 0.9) * path.length, rng.uniform(0.1, 0.8) * start),),
+    )
+    braked = time_scale(
+        path, [*used, zone], robot=ROBOTS["rear_cog"], start_speed=start, too_fast="brake"
+    )
     assert min(braked.margins().values()) >= -1e-9
     assert np.all(np.interp(braked.s, plain.s, plain.sd) >= braked.sd * (1 - 1e-3))
     assert braked.duration > plain.duration

@@ -1,4 +1,5 @@
-"""Stops, start speeds, segments, linear factors, sensitivities, momentum, and life without numba."""
+"""Stops, start speeds, segments, linear factors, sensitivities, momentum, and life without
+numba."""
 
 from __future__ import annotations
 
@@ -27,11 +28,13 @@ def test_a_stop_on_the_way_costs_braking_and_starting(engine):
     at = int(np.argmin(np.abs(stopped.s - 0.8)))
     assert stopped.s[at] == pytest.approx(0.8, abs=1e-9)
     assert stopped.sd[at] == pytest.approx(0.0, abs=1e-6)
+
     # Two rest-to-rest motions; on 0.8 and 1.2 m neither reaches the speed limit but the second.
     def alone(length: float) -> float:
         peak = min(1.0, np.sqrt(2 * length / (1 / 0.5 + 1 / 1.0)))
         ramps = peak**2 / 2 * (1 / 0.5 + 1 / 1.0)
         return peak / 0.5 + peak / 1.0 + (length - ramps) / peak
+
     assert stopped.duration == pytest.approx(alone(0.8) + alone(1.2), rel=1e-4)
     assert stopped.duration > through.duration + 0.3
     assert min(stopped.margins().values()) >= -1e-9
@@ -44,7 +47,11 @@ def test_stops_off_the_path_are_refused(stops):
 
 
 def test_a_rough_duration_is_near_the_exact_one():
-    limits = [limit("speed", largest=1.5), limit("wheel_acceleration", largest=20.0), limit("slip", friction=0.4)]
+    limits = [
+        limit("speed", largest=1.5),
+        limit("wheel_acceleration", largest=20.0),
+        limit("slip", friction=0.4),
+    ]
     for shape in ("straight", "slalom", "hairpin"):
         exact = time_scale(PATHS[shape], limits, robot=ROBOTS["rear_cog"]).duration
         rough = rough_duration(PATHS[shape], limits, robot=ROBOTS["rear_cog"], gridpoints=40)
@@ -52,11 +59,17 @@ def test_a_rough_duration_is_near_the_exact_one():
         fine = rough_duration(PATHS[shape], limits, robot=ROBOTS["rear_cog"], gridpoints=1000)
         assert fine == pytest.approx(exact, rel=1e-3)
     # A straight line under bounds alone: both grids hold the bang-bang time.
-    assert rough_duration(PATHS["straight"], DRIVE) == pytest.approx(time_scale(PATHS["straight"], DRIVE).duration)
+    assert rough_duration(PATHS["straight"], DRIVE) == pytest.approx(
+        time_scale(PATHS["straight"], DRIVE).duration
+    )
 
 
 def test_start_speeds_are_where_time_scaling_turns_infeasible():
-    limits = [limit("speed", largest=2.0), limit("wheel_acceleration", largest=3.0), limit("slip", friction=0.2)]
+    limits = [
+        limit("speed", largest=2.0),
+        limit("wheel_acceleration", largest=3.0),
+        limit("slip", friction=0.2),
+    ]
     low, high = start_speeds(PATHS["slalom"], limits, robot=ROBOTS["rear_cog"])
     assert low == 0.0
     time_scale(PATHS["slalom"], limits, robot=ROBOTS["rear_cog"], start_speed=0.999 * high)
@@ -65,7 +78,11 @@ def test_start_speeds_are_where_time_scaling_turns_infeasible():
 
 
 def test_segments_lie_between_linear_and_the_optimum():
-    limits = [limit("speed", largest=1.0), limit("wheel_acceleration", largest=20.0), limit("slip", friction=0.4)]
+    limits = [
+        limit("speed", largest=1.0),
+        limit("wheel_acceleration", largest=20.0),
+        limit("slip", friction=0.4),
+    ]
     for shape in ("slalom", "hairpin"):
         path, robot = PATHS[shape], ROBOTS["rear_cog"]
         segments = time_scale(path, limits, robot=robot, engine="segments")
@@ -78,11 +95,14 @@ def test_segments_lie_between_linear_and_the_optimum():
         knots = np.searchsorted(segments.u, path.basis.knots)
         for k, factor in enumerate(factors):
             inside = slice(knots[k] + 1, knots[k + 1])
-            assert np.all(segments.sd[inside] <= path.rate(segments.u[inside]) / factor * (1 + 1e-9))
+            assert np.all(
+                segments.sd[inside] <= path.rate(segments.u[inside]) / factor * (1 + 1e-9)
+            )
 
 
 def test_segment_factors_follow_a_given_profile():
-    """Thesis 004, eq. 2.40: the factor is the largest ratio of actual and specified speed in the segment."""
+    """Thesis 004, eq. 2.40: the factor is the largest ratio of actual and specified speed in the
+    segment."""
     path = Path.through([[0, 0], [2, 0], [3, 0], [6, 0]], knots=[0.0, 1.0, 2.0, 3.0])
     profile = limit("speed_profile", places=(0.0, 6.0), speeds=(0.5, 2.0))
     u = np.linspace(0, 3, 301)
@@ -95,9 +115,18 @@ def test_segment_factors_follow_a_given_profile():
 
 def test_linear_factor_reproduces_the_printed_durations():
     """SOURCES 004: T = segments * factor; the largest of the three ratios decides."""
-    assert linear_factor(2.0, 1.0, 1.0, speed_limit=1.0, acceleration_limit=1.0, braking_limit=1.0) == 2.0
-    assert linear_factor(0.5, 9.0, 1.0, speed_limit=1.0, acceleration_limit=1.0, braking_limit=1.0) == 3.0
-    assert linear_factor(0.5, 0.1, 0.1, speed_limit=1.0, acceleration_limit=1.0, braking_limit=1.0) == 1.0
+    assert (
+        linear_factor(2.0, 1.0, 1.0, speed_limit=1.0, acceleration_limit=1.0, braking_limit=1.0)
+        == 2.0
+    )
+    assert (
+        linear_factor(0.5, 9.0, 1.0, speed_limit=1.0, acceleration_limit=1.0, braking_limit=1.0)
+        == 3.0
+    )
+    assert (
+        linear_factor(0.5, 0.1, 0.1, speed_limit=1.0, acceleration_limit=1.0, braking_limit=1.0)
+        == 1.0
+    )
 
 
 def test_linear_touches_a_limit_once():
@@ -111,18 +140,22 @@ def test_sensitivities_are_differences_of_durations():
     limits = [*DRIVE, limit("slip", friction=0.9)]
     result = time_scale(PATHS["straight"], limits, robot=ROBOTS["rear_cog"])
     saved = sensitivities(result)
-    # T = L/V + V/(2 F) + V/(2 B): 1 % of V saves 0.01 (L/V - V/2F - V/2B), of F and B 0.01 (V/2F + V/2B).
+    # T = L/V + V/(2 F) + V/(2 B): 1 % of V saves 0.01 (L/V - V/2F - V/2B), of F and B 0.01 (V/2F +
+    # V/2B).
     assert saved["speed"] == pytest.approx(0.01 * (2 - 1 - 0.5), rel=0.05)
     assert saved["acceleration"] == pytest.approx(0.01 * 1.5, rel=0.05)
     assert saved["slip"] == pytest.approx(0.0, abs=1e-9)
     with pytest.raises(ArgumentError):
-        sensitivities(time_scale(PATHS["straight"], limits, robot=ROBOTS["rear_cog"], engine="linear"))
+        sensitivities(
+            time_scale(PATHS["straight"], limits, robot=ROBOTS["rear_cog"], engine="linear")
+        )
     with pytest.raises(ArgumentError):
         sensitivities(result, change=0.0)
 
 
 def test_momentum_carries_over_a_patch_where_rest_breaks_a_limit():
-    """A short ramp too slippery to stand on is passed with a run-up; standing on it is infeasible."""
+    """A short ramp too slippery to stand on is passed with a run-up; standing on it is
+    infeasible."""
     path = Path.through([[0, 0, 0], [2, 0, 0], [2.5, 0, 0.04], [3, 0, 0.08], [5, 0, 0.08]])
     limits = [limit("speed", largest=3.0), limit("slip", friction=0.12)]
     result = time_scale(path, limits, robot=ROBOTS["rear_cog"], start_speed=0.0)

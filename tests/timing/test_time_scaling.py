@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scaling_cases import ARGUMENTS, HOLONOMIC_ONLY, PATHS, ROBOTS, limit, random_limits, random_path
+from scaling_cases import (
+    ARGUMENTS,
+    HOLONOMIC_ONLY,
+    PATHS,
+    ROBOTS,
+    limit,
+    random_limits,
+    random_path,
+)
 
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.registry import LIMITS
@@ -19,22 +27,39 @@ ENGINES = ("toppra", "compiled")
 KEPT = -1e-9
 
 
-def trapezoid(length: float, speed: float, forward: float, braking: float, start: float = 0.0,
-              end: float = 0.0) -> float:
+def trapezoid(
+    length: float,
+    speed: float,
+    forward: float,
+    braking: float,
+    start: float = 0.0,
+    end: float = 0.0,
+) -> float:
     """Least time on a straight line with speed, acceleration and braking limits."""
-    peak2 = (2 * forward * braking * length + braking * start**2 + forward * end**2) / (forward + braking)
+    peak2 = (2 * forward * braking * length + braking * start**2 + forward * end**2) / (
+        forward + braking
+    )
     peak = min(speed, np.sqrt(peak2))
     cruise = length - (peak**2 - start**2) / (2 * forward) - (peak**2 - end**2) / (2 * braking)
     return (peak - start) / forward + (peak - end) / braking + max(cruise, 0.0) / peak
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("speed", "forward", "braking", "start", "end"), [
-    (1.0, 0.5, 1.0, 0.0, 0.0), (9.0, 0.5, 1.0, 0.0, 0.0), (1.0, 2.0, 0.7, 0.4, 0.9),
-    (1.0, 1.0, 1.0, 1.0, 1.0)])
+@pytest.mark.parametrize(
+    ("speed", "forward", "braking", "start", "end"),
+    [
+        (1.0, 0.5, 1.0, 0.0, 0.0),
+        (9.0, 0.5, 1.0, 0.0, 0.0),
+        (1.0, 2.0, 0.7, 0.4, 0.9),
+        (1.0, 1.0, 1.0, 1.0, 1.0),
+    ],
+)
 def test_straight_line_takes_the_bang_bang_time(engine, speed, forward, braking, start, end):
     path = Path.through([[0, 0], [1, 1], [2, 2]])
-    limits = [limit("speed", largest=speed), limit("acceleration", forward=forward, braking=braking)]
+    limits = [
+        limit("speed", largest=speed),
+        limit("acceleration", forward=forward, braking=braking),
+    ]
     result = time_scale(path, limits, start_speed=start, end_speed=end, engine=engine)
     # The switching points lie between gridpoints: error of second order in the grid.
     expected = trapezoid(path.length, speed, forward, braking, start, end)
@@ -49,7 +74,9 @@ def test_circle_is_driven_at_the_speed_friction_allows(engine):
     points = radius * np.column_stack([np.sin(angles), 1 - np.cos(angles)])
     path = Path.through(points, start_direction=(1.0, 0.0), end_direction=(1.0, 0.0))
     robot = ROBOTS["rear_cog"]
-    result = time_scale(path, [limit("slip", friction=friction, sides=64)], robot=robot, engine=engine)
+    result = time_scale(
+        path, [limit("slip", friction=friction, sides=64)], robot=robot, engine=engine
+    )
     middle = slice(len(result.s) // 3, 2 * len(result.s) // 3)
     # Steady turn about the centre: the centre of gravity, 0.132 m behind, needs wz^2 (0.132, R).
     x, load = 0.132, (0.35 - 0.132) / 0.35
@@ -98,14 +125,26 @@ def test_random_motions_keep_limits_and_beat_linear(seed):
     path = random_path(rng, free_heading=True, knots=int(rng.integers(3, 6)))
     limits, robot = random_limits(rng), ROBOTS["loc8"]
     linear = time_scale(path, limits, robot=robot, gridpoints=150, engine="linear")
-    fast = time_scale(path, limits, robot=robot, gridpoints=150,
-                      start_speed=float(linear.sd[0]), end_speed=float(linear.sd[-1]))
+    fast = time_scale(
+        path,
+        limits,
+        robot=robot,
+        gridpoints=150,
+        start_speed=float(linear.sd[0]),
+        end_speed=float(linear.sd[-1]),
+    )
     assert min(fast.margins().values()) >= KEPT
     assert min(linear.margins().values()) >= KEPT
     assert fast.duration <= linear.duration * (1 + 1e-9)
     looser = [limit("speed", largest=limits[0].largest * 1.3), *limits[1:]]
-    freer = time_scale(path, looser, robot=robot, gridpoints=150,
-                       start_speed=float(linear.sd[0]), end_speed=float(linear.sd[-1]))
+    freer = time_scale(
+        path,
+        looser,
+        robot=robot,
+        gridpoints=150,
+        start_speed=float(linear.sd[0]),
+        end_speed=float(linear.sd[-1]),
+    )
     assert freer.duration <= fast.duration * (1 + 2e-5)
 
 
@@ -122,7 +161,9 @@ class TestInfeasible:
 
     def test_start_speed_too_high_to_brake(self, engine):
         limits = [limit("speed", largest=9.0), limit("acceleration", braking=0.5)]
-        error = self.expect("acceleration", 0.0, self.straight, limits, start_speed=2.0, engine=engine)
+        error = self.expect(
+            "acceleration", 0.0, self.straight, limits, start_speed=2.0, engine=engine
+        )
         assert "1.41421" in str(error)
 
     def test_start_speed_above_the_speed_limit(self, engine):
@@ -138,19 +179,29 @@ class TestInfeasible:
         self.expect("acceleration", 0.0, self.straight, limits, end_speed=2.0, engine=engine)
 
     def test_friction_too_low_for_the_ramp(self, engine):
-        path = Path.through([[0, 0, 0], [1, 0, 0], [2, 0, 0.3], [3, 0, 0.6], [4, 0, 0.6], [5, 0, 0.6]])
+        path = Path.through(
+            [[0, 0, 0], [1, 0, 0], [2, 0, 0.3], [3, 0, 0.6], [4, 0, 0.6], [5, 0, 0.6]]
+        )
         limits = [limit("speed"), limit("slip", friction=0.1)]
-        # Momentum could carry it up the last metre; before 2.51 m that needs more than the speed limit.
+        # Momentum could carry it up the last metre; before 2.51 m that needs more than the speed
+        # limit.
         error = self.expect("slip", 2.51, path, limits, robot=ROBOTS["rear_cog"], engine=engine)
         assert "standing still" in str(error)
 
     def test_zone_of_speed_zero(self, engine):
-        limits = [limit("speed"), limit("acceleration"), limit("speed_zones", zones=((0.5, 0.7, 0.0),))]
+        limits = [
+            limit("speed"),
+            limit("acceleration"),
+            limit("speed_zones", zones=((0.5, 0.7, 0.0),)),
+        ]
         self.expect("speed_zones", 0.5, self.straight, limits, engine=engine)
 
     def test_profile_that_falls_to_zero_inside(self, engine):
-        limits = [limit("speed"), limit("acceleration"),
-                  limit("speed_profile", places=(0.0, 1.0, 2.0), speeds=(1.0, 0.0, 1.0))]
+        limits = [
+            limit("speed"),
+            limit("acceleration"),
+            limit("speed_profile", places=(0.0, 1.0, 2.0), speeds=(1.0, 0.0, 1.0)),
+        ]
         self.expect("speed_profile", 1.0, self.straight, limits, engine=engine)
 
     def test_turn_on_the_spot_that_nothing_bounds(self, engine):
@@ -163,7 +214,9 @@ class TestInfeasible:
             time_scale(PATHS["sideways"], [limit("speed")], robot=ROBOTS["rear_cog"], engine=engine)
 
     def test_step_in_the_way(self, engine):
-        self.expect("terrain", 1.2, self.straight, [limit("speed")], terrain=Step(0.1, 1.2), engine=engine)
+        self.expect(
+            "terrain", 1.2, self.straight, [limit("speed")], terrain=Step(0.1, 1.2), engine=engine
+        )
 
 
 def test_path_that_doubles_back_names_the_place():
@@ -173,10 +226,20 @@ def test_path_that_doubles_back_names_the_place():
     assert caught.value.place == pytest.approx(caught.value.place)
 
 
-@pytest.mark.parametrize("change", [
-    {"start_speed": -1.0}, {"end_speed": float("nan")}, {"gridpoints": 1}, {"gridpoints": [0.0, 5.0]},
-    {"engine": "magic"}, {"engine": "linear", "start_speed": 1.0}, {"limits": []},
-    {"limits": [limit("speed"), limit("speed")]}, {"limits": [limit("wheel_speed")]}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"start_speed": -1.0},
+        {"end_speed": float("nan")},
+        {"gridpoints": 1},
+        {"gridpoints": [0.0, 5.0]},
+        {"engine": "magic"},
+        {"engine": "linear", "start_speed": 1.0},
+        {"limits": []},
+        {"limits": [limit("speed"), limit("speed")]},
+        {"limits": [limit("wheel_speed")]},
+    ],
+)
 def test_bad_arguments_are_named(change):
     arguments = {"limits": [limit("speed"), limit("acceleration")], **change}
     with pytest.raises(ArgumentError):

@@ -24,7 +24,11 @@ def test_twist_is_the_derivative_of_the_pose(shape):
     s = result.along(t)[0]
     planar = np.hypot(rate[:, 0], rate[:, 1])
     yaw = here.pose[:, 2]
-    lift = np.gradient(PATHS[shape].position(PATHS[shape].locate(s))[:, 2], s) if shape == "ramp" else 0 * s
+    lift = (
+        np.gradient(PATHS[shape].position(PATHS[shape].locate(s))[:, 2], s)
+        if shape == "ramp"
+        else 0 * s
+    )
     level = np.sqrt(1 - lift**2) if shape == "ramp" else 1.0
     forward = np.cos(yaw) * rate[:, 0] + np.sin(yaw) * rate[:, 1]
     left = -np.sin(yaw) * rate[:, 0] + np.cos(yaw) * rate[:, 1]
@@ -53,8 +57,13 @@ def test_final_wheel_angles_are_the_integral_of_geometry(shape):
             length = np.linalg.norm(d, axis=1)
             motion = np.column_stack([length, 0 * u, turn * np.hypot(d[:, 0], d[:, 1]) / length])
         else:
-            motion = np.column_stack([np.cos(yaw) * d[:, 0] + np.sin(yaw) * d[:, 1],
-                                      -np.sin(yaw) * d[:, 0] + np.cos(yaw) * d[:, 1], turn])
+            motion = np.column_stack(
+                [
+                    np.cos(yaw) * d[:, 0] + np.sin(yaw) * d[:, 1],
+                    -np.sin(yaw) * d[:, 0] + np.cos(yaw) * d[:, 1],
+                    turn,
+                ]
+            )
         rates = (motion @ robot.inverse.T).reshape(len(half), len(nodes), -1)
         expected += np.einsum("cgw,g,c->w", rates, weights, half)
     for limits in (DRIVE, [limit("speed", largest=0.3), limit("wheel_acceleration", largest=2.0)]):
@@ -69,8 +78,9 @@ def test_two_fixed_wheels_close_the_form():
     t = np.linspace(0, result.duration, 50)
     state, s = result.at(t), result.along(t)[0]
     turn = state.pose[:, 2] - state.pose[0, 2]
-    np.testing.assert_allclose(state.wheel_angles * 0.12, np.column_stack([s - 0.2 * turn, s + 0.2 * turn]),
-                               atol=1e-9)
+    np.testing.assert_allclose(
+        state.wheel_angles * 0.12, np.column_stack([s - 0.2 * turn, s + 0.2 * turn]), atol=1e-9
+    )
 
 
 def test_yaw_is_continuous_over_more_than_a_turn():
@@ -104,8 +114,10 @@ def test_without_a_robot_there_are_no_wheels():
 
 
 def test_active_tells_what_binds_on_a_trapezoid():
-    result = time_scale(PATHS["straight"], [limit("speed", largest=1.0),
-                                            limit("acceleration", forward=1.0, braking=2.0)])
+    result = time_scale(
+        PATHS["straight"],
+        [limit("speed", largest=1.0), limit("acceleration", forward=1.0, braking=2.0)],
+    )
     assert [stretch.limit for stretch in result.active] == ["acceleration", "speed", "acceleration"]
     assert result.active[0].end == pytest.approx(0.5, abs=0.02)
     assert result.active[1].end == pytest.approx(1.75, abs=0.02)
@@ -114,7 +126,9 @@ def test_active_tells_what_binds_on_a_trapezoid():
 
 def test_speed_zone_edges_are_gridpoints_and_kept():
     zones = limit("speed_zones", zones=((0.333, 0.777, 0.4),))
-    result = time_scale(PATHS["straight"], [limit("speed"), limit("acceleration"), zones], gridpoints=40)
+    result = time_scale(
+        PATHS["straight"], [limit("speed"), limit("acceleration"), zones], gridpoints=40
+    )
     assert np.abs(result.s[:, None] - [0.333, 0.777]).min(axis=0).max() < 1e-9
     inside = (result.s > 0.333) & (result.s < 0.777)
     assert result.sd[inside].max() <= 0.4 + 1e-12

@@ -1,4 +1,5 @@
-"""The command line. Exit codes: 0 for a result that holds, 1 for one that does not, 2 for unusable input."""
+"""The command line. Exit codes: 0 for a result that holds, 1 for one that does not, 2 for unusable
+input."""
 
 from __future__ import annotations
 
@@ -10,10 +11,23 @@ from rich.console import Console
 from trajopt.cli import bench, maneuvers, paths, search, sweep
 from trajopt.errors import TrajoptError
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False,
-                  help="Plan, time and check motions of wheeled ground robots.")
-for command in (search.solve, search.validate, maneuvers.plan, maneuvers.climb, paths.explain, paths.export,
-                paths.compare, search.schema, sweep.report):
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Plan, time and check motions of wheeled ground robots.",
+)
+for command in (
+    search.solve,
+    search.validate,
+    maneuvers.plan,
+    maneuvers.climb,
+    paths.explain,
+    paths.export,
+    paths.compare,
+    search.schema,
+    sweep.report,
+):
     app.command()(command)
 app.add_typer(bench.app, name="bench")
 app.add_typer(sweep.app, name="sweep")
@@ -28,7 +42,9 @@ def main() -> None:
     except TrajoptError as error:
         Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, highlight=False)
         sys.exit(UNUSABLE)
-    except OSError as error:  # a folder that cannot be made, a full disk: the message names the file
+    except (
+        OSError
+    ) as error:  # a folder that cannot be made, a full disk: the message names the file
         Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, highlight=False)
         sys.exit(UNUSABLE)
     except KeyboardInterrupt:

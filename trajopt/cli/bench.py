@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 if TYPE_CHECKING:
     from trajopt.study.drive import Progress as SweepProgress
@@ -19,7 +26,8 @@ BEST_KNOWN = Path("trajopt") / "study" / "best_known.json"  # in a checkout
 
 
 class _FileFirst(typer.core.TyperGroup):
-    """``trajopt bench FILE`` is ``trajopt bench run FILE`` (typer knows default commands only this way)."""
+    """``trajopt bench FILE`` is ``trajopt bench run FILE`` (typer knows default commands only this
+    way)."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         if args and args[0] not in self.commands and not args[0].startswith("-"):
@@ -27,28 +35,49 @@ class _FileFirst(typer.core.TyperGroup):
         return super().parse_args(ctx, args)
 
 
-app = typer.Typer(cls=_FileFirst, no_args_is_help=True, pretty_exceptions_enable=False,
-                  help="Compare optimizers on many problems, resumable, with profiles and a page of answers.")
+app = typer.Typer(
+    cls=_FileFirst,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Compare optimizers on many problems, resumable, with profiles and a page of answers.",
+)
 
 BenchFile = Annotated[Path, typer.Argument(help="bench file (*.toml)", show_default=False)]
-StoreOption = Annotated[Path | None, typer.Option("--store", help="rows; default: out/bench/<name of the file>")]
-Plugins = Annotated[list[Path] | None, typer.Option("--plugin", help="Python file with own OPTIMIZERS or PROBLEMS")]
+StoreOption = Annotated[
+    Path | None, typer.Option("--store", help="rows; default: out/bench/<name of the file>")
+]
+Plugins = Annotated[
+    list[Path] | None, typer.Option("--plugin", help="Python file with own OPTIMIZERS or PROBLEMS")
+]
 
 
 @app.command(RUN)
-def run(bench_file: BenchFile, store: StoreOption = None, plugin: Plugins = None,
-        jobs: Annotated[int, typer.Option(help="searches at a time")] = 1,
-        retry_failed: Annotated[bool, typer.Option(help="also run again what hung, raised or died")] = False) -> None:
+def run(
+    bench_file: BenchFile,
+    store: StoreOption = None,
+    plugin: Plugins = None,
+    jobs: Annotated[int, typer.Option(help="searches at a time")] = 1,
+    retry_failed: Annotated[
+        bool, typer.Option(help="also run again what hung, raised or died")
+    ] = False,
+) -> None:
     """Run every search that has no row yet; started again after any interruption, it goes on."""
     from trajopt.study.bench import load_bench, run_bench
 
     plan = load_bench(bench_file, plugin or ())
     place = store or default_store(bench_file)
     total = len(plan.cases())
-    console.print(f"{plan.title}: {len(plan.problems)} problems, {len(plan.optimizers)} optimizers, {total} searches; "
-                  f"rows in {place}")
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-               TimeRemainingColumn())
+    console.print(
+        f"{plan.title}: {len(plan.problems)} problems, {len(plan.optimizers)} optimizers, {total} searches; "
+        f"rows in {place}"
+    )
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
     with Progress(*columns, console=console) as bar:
         task = bar.add_task("searches", total=None)
 
@@ -60,8 +89,14 @@ def run(bench_file: BenchFile, store: StoreOption = None, plugin: Plugins = None
 
 
 @app.command("report")
-def report(store: Annotated[Path, typer.Argument(help="rows of a benchmark (its directory)", show_default=False)],
-           out: Annotated[Path | None, typer.Option("--out", help="folder; default: <store>/report")] = None) -> None:
+def report(
+    store: Annotated[
+        Path, typer.Argument(help="rows of a benchmark (its directory)", show_default=False)
+    ],
+    out: Annotated[
+        Path | None, typer.Option("--out", help="folder; default: <store>/report")
+    ] = None,
+) -> None:
     """Write the page: tables (Markdown, CSV), profiles (PNG, SVG) and the answers in words."""
     from trajopt.report.bench import write_report
     from trajopt.study.store import open_store
@@ -71,8 +106,12 @@ def report(store: Annotated[Path, typer.Argument(help="rows of a benchmark (its 
 
 
 @app.command("best")
-def best(store: Annotated[Path, typer.Argument(help="rows of a benchmark (its directory)", show_default=False)],
-         file: Annotated[Path, typer.Option("--file", help="JSON file to merge into")] = BEST_KNOWN) -> None:
+def best(
+    store: Annotated[
+        Path, typer.Argument(help="rows of a benchmark (its directory)", show_default=False)
+    ],
+    file: Annotated[Path, typer.Option("--file", help="JSON file to merge into")] = BEST_KNOWN,
+) -> None:
     """Keep the best costs of a benchmark, with who found them, in the file of best known values."""
     from trajopt.study.bench import write_best_known
     from trajopt.study.store import open_store

@@ -1,4 +1,5 @@
-"""``trajopt explain | export | compare``: the timing of a problem with a given path, or of a saved solution."""
+"""``trajopt explain | export | compare``: the timing of a problem with a given path, or of a saved
+solution."""
 
 from __future__ import annotations
 
@@ -15,17 +16,25 @@ from trajopt.errors import ArgumentError
 if TYPE_CHECKING:
     from trajopt.timing.trajectory import Trajectory
 
-Plan = Annotated[Path, typer.Argument(help="problem file (*.toml) or folder written by solve --out")]
+Plan = Annotated[
+    Path, typer.Argument(help="problem file (*.toml) or folder written by solve --out")
+]
 
 
-def explain(plan: Plan, set_: Overrides = None,
-            engine: Annotated[str, typer.Option(help="auto, toppra or compiled")] = "auto") -> None:
+def explain(
+    plan: Plan,
+    set_: Overrides = None,
+    engine: Annotated[str, typer.Option(help="auto, toppra or compiled")] = "auto",
+) -> None:
     """Show which limit binds on which stretch, and what a 1 % change of each limit would save."""
     from trajopt.timing.sensitivity import sensitivities
 
     trajectory = _timed(plan, set_, engine)
-    console.print(f"[bold]{plan}[/bold]: {trajectory.duration:.4f} s over {trajectory.path.length:.3f} m "
-                  f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e})", highlight=False)
+    console.print(
+        f"[bold]{plan}[/bold]: {trajectory.duration:.4f} s over {trajectory.path.length:.3f} m "
+        f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e})",
+        highlight=False,
+    )
     stretches = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("from s (m)", "to s (m)", "limit that binds"):
         stretches.add_column(column, justify="left" if "limit" in column else "right")
@@ -41,31 +50,44 @@ def explain(plan: Plan, set_: Overrides = None,
     console.print(limits)
 
 
-def export(plan: Plan, out: Annotated[Path, typer.Option(help="CSV file to write")],
-           sample_time: Annotated[float, typer.Option(help="seconds between commands")] = 0.5,
-           rule: Annotated[str, typer.Option(help="mean: exact wheel angles; held: as thesis 004 digitises")] = "mean",
-           set_: Overrides = None) -> None:
+def export(
+    plan: Plan,
+    out: Annotated[Path, typer.Option(help="CSV file to write")],
+    sample_time: Annotated[float, typer.Option(help="seconds between commands")] = 0.5,
+    rule: Annotated[
+        str, typer.Option(help="mean: exact wheel angles; held: as thesis 004 digitises")
+    ] = "mean",
+    set_: Overrides = None,
+) -> None:
     """Write wheel speed commands (t, v_left, v_right) of a differential drive."""
     from trajopt.control.commands import commands, export_commands
 
     if rule not in ("mean", "held"):
         raise ArgumentError("--rule", rule, "mean or held")
-    orders = commands(_timed(plan, set_, "auto"), sample_time, rule="mean" if rule == "mean" else "held")
+    orders = commands(
+        _timed(plan, set_, "auto"), sample_time, rule="mean" if rule == "mean" else "held"
+    )
     export_commands(orders, out)
     console.print(f"wrote {len(orders.times)} commands to {out}", highlight=False, soft_wrap=True)
 
 
-def compare(plan: Plan, log: Annotated[Path, typer.Argument(help="CSV with columns t, x, y, yaw, v")],
-            set_: Overrides = None) -> None:
+def compare(
+    plan: Plan,
+    log: Annotated[Path, typer.Argument(help="CSV with columns t, x, y, yaw, v")],
+    set_: Overrides = None,
+) -> None:
     """Compare a plan with the log of what the robot did, in the terms of thesis 004's tables."""
     from trajopt.control.commands import compare_log
 
     found = compare_log(_timed(plan, set_, "auto"), log)
     table = Table(box=box.SIMPLE_HEAD, show_header=False, pad_edge=False)
-    for name, value in (("speed error", f"{found.speed_error:.4f} m/s"),
-                        ("heading error", f"{found.heading_error:.4f} rad"),
-                        ("goal offset", f"{found.goal_offset:.4f} m"), ("time offset", f"{found.time_offset:.3f} s"),
-                        ("distance", f"{found.distance:.3f} m")):
+    for name, value in (
+        ("speed error", f"{found.speed_error:.4f} m/s"),
+        ("heading error", f"{found.heading_error:.4f} rad"),
+        ("goal offset", f"{found.goal_offset:.4f} m"),
+        ("time offset", f"{found.time_offset:.3f} s"),
+        ("distance", f"{found.distance:.3f} m"),
+    ):
         table.add_row(name, value)
     console.print(table)
 
@@ -83,12 +105,16 @@ def _timed(plan: Path, set_: list[str] | None, engine: str) -> Trajectory:
         from trajopt.report.run_folder import read_solution
 
         if set_:
-            raise ArgumentError("--set", set_, "no overrides with a run folder; give the problem file instead")
+            raise ArgumentError(
+                "--set", set_, "no overrides with a run folder; give the problem file instead"
+            )
         solution = read_solution(plan)
     elif timed_here:
         return time_path(load_path_problem(plan, overrides(set_)), engine=engine)
     else:
         solution = solve(load_problem(plan, overrides(set_)))
     if solution.trajectory is None:
-        raise ArgumentError("plan", str(plan), "a problem with a feasible motion; " + solution.status)
+        raise ArgumentError(
+            "plan", str(plan), "a problem with a feasible motion; " + solution.status
+        )
     return solution.trajectory

@@ -1,4 +1,5 @@
-"""``trajopt solve | validate | schema``: search control points, time the path, check it in physics."""
+"""``trajopt solve | validate | schema``: search control points, time the path, check it in
+physics."""
 
 from __future__ import annotations
 
@@ -8,27 +9,46 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trajopt.cli.shared import FAULTY, Bar, ControlOption, Overrides, ProblemFile, console, control_mode, overrides
+from trajopt.cli.shared import (
+    FAULTY,
+    Bar,
+    ControlOption,
+    Overrides,
+    ProblemFile,
+    console,
+    control_mode,
+    overrides,
+)
 from trajopt.errors import ArgumentError
 
 if TYPE_CHECKING:
     from trajopt.optimize.base import Budget
     from trajopt.pipeline import Solution
 
-Out = Annotated[Path | None, typer.Option("--out", help="folder for trajectory, summary and pictures")]
+Out = Annotated[
+    Path | None, typer.Option("--out", help="folder for trajectory, summary and pictures")
+]
 
 
-def solve(problem: ProblemFile,
-          optimizer: Annotated[str, typer.Option(help="auto, the name of an optimizer, or file.py:name")] = "auto",
-          plugin: Annotated[Path | None, typer.Option(help="Python file with own OPTIMIZERS, known by name")] = None,
-          seed: Annotated[int, typer.Option(help="seed of everything random")] = 0,
-          out: Out = None,
-          set_: Overrides = None,
-          evaluations: Annotated[int | None, typer.Option(help="budget of objective evaluations")] = None,
-          seconds: Annotated[float | None, typer.Option(help="budget of wall-clock seconds")] = None,
-          target: Annotated[float | None, typer.Option(help="stop when the cost is this low")] = None,
-          x0: Annotated[Path | None, typer.Option(help="start from a saved solution (its folder)")] = None,
-          pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True) -> None:
+def solve(
+    problem: ProblemFile,
+    optimizer: Annotated[
+        str, typer.Option(help="auto, the name of an optimizer, or file.py:name")
+    ] = "auto",
+    plugin: Annotated[
+        Path | None, typer.Option(help="Python file with own OPTIMIZERS, known by name")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="seed of everything random")] = 0,
+    out: Out = None,
+    set_: Overrides = None,
+    evaluations: Annotated[int | None, typer.Option(help="budget of objective evaluations")] = None,
+    seconds: Annotated[float | None, typer.Option(help="budget of wall-clock seconds")] = None,
+    target: Annotated[float | None, typer.Option(help="stop when the cost is this low")] = None,
+    x0: Annotated[
+        Path | None, typer.Option(help="start from a saved solution (its folder)")
+    ] = None,
+    pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
+) -> None:
     """Search control points, time the path, and write what was found."""
     from trajopt.pipeline import solve as solve_problem
     from trajopt.problem import load_problem
@@ -43,7 +63,9 @@ def solve(problem: ProblemFile,
 
         start = read_solution(x0).search.x
     with Bar(f"{optimizer}", budget.evaluations) as bar:
-        solution = solve_problem(loaded, optimizer=optimizer, seed=seed, budget=budget, x0=start, progress=bar.update)
+        solution = solve_problem(
+            loaded, optimizer=optimizer, seed=seed, budget=budget, x0=start, progress=bar.update
+        )
     console.print(solution_table(solution))
     if out is not None:
         _write(solution, out, seed, pictures)
@@ -53,11 +75,15 @@ def solve(problem: ProblemFile,
         raise typer.Exit(FAULTY)
 
 
-def validate(folder: Annotated[Path, typer.Argument(help="folder written by solve --out")],
-             engine: Annotated[str, typer.Option(help="pybullet or mujoco")] = "pybullet",
-             control: ControlOption = "none",
-             seed: Annotated[int, typer.Option(help="seed of the measured pose's noise, with --control")] = 0,
-             pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True) -> None:
+def validate(
+    folder: Annotated[Path, typer.Argument(help="folder written by solve --out")],
+    engine: Annotated[str, typer.Option(help="pybullet or mujoco")] = "pybullet",
+    control: ControlOption = "none",
+    seed: Annotated[
+        int, typer.Option(help="seed of the measured pose's noise, with --control")
+    ] = 0,
+    pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
+) -> None:
     """Drive a saved solution in a physics engine with real rollers and measure the deviation."""
     from trajopt.pipeline import validate as validate_trajectory
     from trajopt.report.run_folder import read_solution, write_validation
@@ -65,11 +91,20 @@ def validate(folder: Annotated[Path, typer.Argument(help="folder written by solv
 
     solution = read_solution(folder)
     if solution.trajectory is None:
-        raise ArgumentError("folder", str(folder), "a solution with a trajectory; this one has none: "
-                            + solution.status)
+        raise ArgumentError(
+            "folder",
+            str(folder),
+            "a solution with a trajectory; this one has none: " + solution.status,
+        )
     with Bar(f"{engine}", None):
-        report = validate_trajectory(solution.trajectory, solution.problem, engine=engine, picture=pictures,
-                                     control=control_mode(control), seed=seed)
+        report = validate_trajectory(
+            solution.trajectory,
+            solution.problem,
+            engine=engine,
+            picture=pictures,
+            control=control_mode(control),
+            seed=seed,
+        )
     console.print(validation_table(report))
     write_validation(report, folder)
     if pictures:
@@ -79,7 +114,11 @@ def validate(folder: Annotated[Path, typer.Argument(help="folder written by solv
     console.print(f"written to {folder}", highlight=False, soft_wrap=True)
 
 
-def schema(out: Annotated[Path | None, typer.Option(help="file to write; standard output without it")] = None) -> None:
+def schema(
+    out: Annotated[
+        Path | None, typer.Option(help="file to write; standard output without it")
+    ] = None,
+) -> None:
     """Print the JSON schema of problem files, for editors."""
     from trajopt.problem import problem_schema
 
@@ -104,7 +143,11 @@ def _of_plugin(optimizer: str, plugin: Path | None) -> str:
     """The optimizer's name, with the plugin file where it is that one's."""
     from trajopt.optimize.plugins import optimizers_of_file
 
-    return f"{plugin}:{optimizer}" if plugin is not None and optimizer in optimizers_of_file(plugin) else optimizer
+    return (
+        f"{plugin}:{optimizer}"
+        if plugin is not None and optimizer in optimizers_of_file(plugin)
+        else optimizer
+    )
 
 
 def _budget(evaluations: int | None, seconds: float | None, target: float | None) -> Budget:

@@ -18,18 +18,34 @@ console = Console(width=None if sys.stdout.isatty() else 120)  # tables keep the
 
 FAULTY = 1
 # What can be switched on in a physics check; None drives the planned wheel speeds.
-CONTROLS: dict[str, Mode | None] = {"none": None, "servo": "wheel servo", "pose": "pose",
-                                    "pose-and-phase": "pose and phase"}
+CONTROLS: dict[str, Mode | None] = {
+    "none": None,
+    "servo": "wheel servo",
+    "pose": "pose",
+    "pose-and-phase": "pose and phase",
+}
 
 ProblemFile = Annotated[Path, typer.Argument(help="problem file (*.toml)", show_default=False)]
-ControlOption = Annotated[str, typer.Option(
-    "--control", help="none (planned wheel speeds), servo (planned wheel angles), pose, or pose-and-phase")]
-Overrides = Annotated[list[str] | None, typer.Option(
-    "--set", help="change a key of the problem, e.g. --set goal.wheels=[0,0,0,0]", show_default=False)]
+ControlOption = Annotated[
+    str,
+    typer.Option(
+        "--control",
+        help="none (planned wheel speeds), servo (planned wheel angles), pose, or pose-and-phase",
+    ),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="change a key of the problem, e.g. --set goal.wheels=[0,0,0,0]",
+        show_default=False,
+    ),
+]
 
 
 def overrides(items: list[str] | None) -> dict[str, Any]:
-    """Dotted keys and their values, each value read as TOML, or as a bare string where it is none."""
+    """Dotted keys and their values, each value read as TOML, or as a bare string where it is
+    none."""
     found: dict[str, Any] = {}
     for item in items or []:
         key, sign, text = item.partition("=")
@@ -54,8 +70,14 @@ class Bar:
 
     def __init__(self, name: str, total: int | None) -> None:
         self._progress = Progress(
-            TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[best]}"), TimeElapsedColumn(),
-            console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty())
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TextColumn("{task.fields[best]}"),
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            transient=True,
+            disable=not sys.stderr.isatty(),
+        )
         self._task = self._progress.add_task(name, total=total, best="")
 
     def __enter__(self) -> Bar:

@@ -24,26 +24,43 @@ if TYPE_CHECKING:
     from trajopt.study.store import Store
     from trajopt.study.sweepfile import SweepPlan
 
-app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False,
-                  help="Run a study over many cases, on one machine or on a cluster, and lose nothing.")
+app = typer.Typer(
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="Run a study over many cases, on one machine or on a cluster, and lose nothing.",
+)
 console = Console()
 
 _SHOWN = 5  # cases shown by --dry-run
 
 SweepFile = Annotated[Path, typer.Argument(help="sweep file (*.toml)", show_default=False)]
-StorePath = Annotated[Path, typer.Argument(help="store of a sweep (its directory)", show_default=False)]
-StoreOption = Annotated[Path | None, typer.Option("--store", help="store; default: out/sweeps/<name of the file>")]
+StorePath = Annotated[
+    Path, typer.Argument(help="store of a sweep (its directory)", show_default=False)
+]
+StoreOption = Annotated[
+    Path | None, typer.Option("--store", help="store; default: out/sweeps/<name of the file>")
+]
 Workers = Annotated[int, typer.Option(help="worker processes or jobs (0: all processors)")]
-EngineName = Annotated[str, typer.Option("--engine", help="processes, dask, dask-slurm, or tcp://host:port of a "
-                                                          "Dask scheduler")]
+EngineName = Annotated[
+    str,
+    typer.Option(
+        "--engine", help="processes, dask, dask-slurm, or tcp://host:port of a Dask scheduler"
+    ),
+]
 Host = Annotated[str, typer.Option(help="address at which Dask's servers listen")]
 
 
 @app.command()
-def run(sweep_file: SweepFile, store: StoreOption = None, workers: Workers = 0, engine: EngineName = "processes",
-        host: Host = "127.0.0.1",
-        dry_run: Annotated[bool, typer.Option(help="show cases and an estimate of the time; store nothing")] = False,
-        ) -> None:
+def run(
+    sweep_file: SweepFile,
+    store: StoreOption = None,
+    workers: Workers = 0,
+    engine: EngineName = "processes",
+    host: Host = "127.0.0.1",
+    dry_run: Annotated[
+        bool, typer.Option(help="show cases and an estimate of the time; store nothing")
+    ] = False,
+) -> None:
     """Run every case that has no row yet."""
     from trajopt.study.sweepfile import load_sweep
 
@@ -51,29 +68,46 @@ def run(sweep_file: SweepFile, store: StoreOption = None, workers: Workers = 0, 
     if dry_run:
         _dry_run(plan, workers)
         return
-    _go(plan, store or _default_store(sweep_file), _engine(engine, workers, host), retry_failed=False)
+    _go(
+        plan,
+        store or _default_store(sweep_file),
+        _engine(engine, workers, host),
+        retry_failed=False,
+    )
 
 
 @app.command("retry-failed")
-def retry_failed(sweep_file: SweepFile, store: StoreOption = None, workers: Workers = 0,
-                 engine: EngineName = "processes", host: Host = "127.0.0.1") -> None:
+def retry_failed(
+    sweep_file: SweepFile,
+    store: StoreOption = None,
+    workers: Workers = 0,
+    engine: EngineName = "processes",
+    host: Host = "127.0.0.1",
+) -> None:
     """Run cases again that failed, timed out or crashed, and those without a row."""
     from trajopt.study.sweepfile import load_sweep
 
-    _go(load_sweep(sweep_file), store or _default_store(sweep_file), _engine(engine, workers, host),
-        retry_failed=True)
+    _go(
+        load_sweep(sweep_file),
+        store or _default_store(sweep_file),
+        _engine(engine, workers, host),
+        retry_failed=True,
+    )
 
 
 @app.command()
-def submit(sweep_file: SweepFile, store: StoreOption = None,
-           slurm: Annotated[bool, typer.Option("--slurm", help="as a Slurm job array")] = False,
-           elements: Annotated[int, typer.Option(help="array elements (0: by measured time)")] = 0,
-           at_once: Annotated[int, typer.Option(help="elements running together (0: no limit)")] = 0,
-           time_: Annotated[str, typer.Option("--time", help="time limit of an element")] = "01:00:00",
-           memory: Annotated[str, typer.Option(help="memory of an element")] = "2G",
-           partition: Annotated[str | None, typer.Option(help="Slurm partition")] = None,
-           wait: Annotated[bool, typer.Option(help="wait until the array has ended")] = False,
-           failed: Annotated[bool, typer.Option("--retry-failed", help="failed cases too")] = False) -> None:
+def submit(
+    sweep_file: SweepFile,
+    store: StoreOption = None,
+    slurm: Annotated[bool, typer.Option("--slurm", help="as a Slurm job array")] = False,
+    elements: Annotated[int, typer.Option(help="array elements (0: by measured time)")] = 0,
+    at_once: Annotated[int, typer.Option(help="elements running together (0: no limit)")] = 0,
+    time_: Annotated[str, typer.Option("--time", help="time limit of an element")] = "01:00:00",
+    memory: Annotated[str, typer.Option(help="memory of an element")] = "2G",
+    partition: Annotated[str | None, typer.Option(help="Slurm partition")] = None,
+    wait: Annotated[bool, typer.Option(help="wait until the array has ended")] = False,
+    failed: Annotated[bool, typer.Option("--retry-failed", help="failed cases too")] = False,
+) -> None:
     """Hand the missing cases to Slurm and return; nothing here needs to stay alive."""
     from trajopt.study.host import CaseLimits
     from trajopt.study.slurm import SlurmOptions
@@ -85,13 +119,22 @@ def submit(sweep_file: SweepFile, store: StoreOption = None,
         raise ArgumentError("--slurm", False, "--slurm: job arrays are submitted to Slurm only")
     plan = load_sweep(sweep_file)
     place = open_store(store or _default_store(sweep_file))
-    done = hand_over(plan.table, plan.run, place, limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
-                     options=SlurmOptions(time_, memory, partition, at_once, elements), source=plan.text,
-                     retry_failed=failed, wait=wait)
+    done = hand_over(
+        plan.table,
+        plan.run,
+        place,
+        limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
+        options=SlurmOptions(time_, memory, partition, at_once, elements),
+        source=plan.text,
+        retry_failed=failed,
+        wait=wait,
+    )
     if not done.job:
         console.print("nothing is missing")
     else:
-        console.print(f"job {done.job}: {done.cases} cases in {done.elements} elements; store {place.path}")
+        console.print(
+            f"job {done.job}: {done.cases} cases in {done.elements} elements; store {place.path}"
+        )
 
 
 @app.command()
@@ -105,18 +148,30 @@ def status(store: StorePath) -> None:
     for name, count in counts.items():
         shown.add_row(name, str(count))
     if runs:
-        shown.add_row("missing (of the last sweep)", str(max(0, int(runs[-1]["cases"]) - sum(counts.values()))))
+        shown.add_row(
+            "missing (of the last sweep)",
+            str(max(0, int(runs[-1]["cases"]) - sum(counts.values()))),
+        )
     console.print(shown)
-    listing = Table("run", "state", "engine", "missing then", "commit", title="runs", title_justify="left")
+    listing = Table(
+        "run", "state", "engine", "missing then", "commit", title="runs", title_justify="left"
+    )
     for entry in runs[-_SHOWN:]:
-        listing.add_row(entry["run"], entry["state"], entry["engine"], str(entry["missing"]),
-                        str(entry["commit"])[:10])
+        listing.add_row(
+            entry["run"],
+            entry["state"],
+            entry["engine"],
+            str(entry["missing"]),
+            str(entry["commit"])[:10],
+        )
     console.print(listing)
     _print_errors(place)
 
 
 @app.command()
-def show(store: StorePath, case: Annotated[str, typer.Argument(help="first digits of a case")]) -> None:
+def show(
+    store: StorePath, case: Annotated[str, typer.Argument(help="first digits of a case")]
+) -> None:
     """One case: its values, results, arrays, and the traceback of its error."""
     from trajopt.study.store import open_store
 
@@ -132,10 +187,16 @@ def show(store: StorePath, case: Annotated[str, typer.Argument(help="first digit
         console.print(row["error_traceback"], markup=False, highlight=False)
 
 
-def report(source: Annotated[Path, typer.Argument(help="sweep file (*.toml), the store of a sweep, or a run folder")],
-           case: Annotated[str, typer.Argument(help="first digits of a case; none for a run folder")] = "",
-           out: Annotated[Path | None, typer.Option("--out", help="folder; default: out/report/<case>")] = None,
-           store: StoreOption = None) -> None:
+def report(
+    source: Annotated[
+        Path, typer.Argument(help="sweep file (*.toml), the store of a sweep, or a run folder")
+    ],
+    case: Annotated[str, typer.Argument(help="first digits of a case; none for a run folder")] = "",
+    out: Annotated[
+        Path | None, typer.Option("--out", help="folder; default: out/report/<case>")
+    ] = None,
+    store: StoreOption = None,
+) -> None:
     """Draw the pictures of one case out of a sweep, or of a folder that solve wrote, again."""
     from trajopt.study.store import open_store
 
@@ -150,7 +211,9 @@ def report(source: Annotated[Path, typer.Argument(help="sweep file (*.toml), the
 
         plan = None if source.is_dir() else load_sweep(source)
         place = source if plan is None else store or _default_store(source)
-        files = report_case(open_store(place, create=False), case, out or Path("out") / "report" / case, plan)
+        files = report_case(
+            open_store(place, create=False), case, out or Path("out") / "report" / case, plan
+        )
     for file in files:
         console.print(f"wrote {file}", highlight=False, soft_wrap=True)
 
@@ -165,7 +228,9 @@ def compact(store: StorePath) -> None:
 
 
 @app.command()
-def export(store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]) -> None:
+def export(
+    store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]
+) -> None:
     """Write all rows, one a case, to one file."""
     from trajopt.study.store import open_store
 
@@ -185,14 +250,19 @@ def export(store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.c
 
 
 @app.command()
-def plot(store: StorePath, out: Annotated[Path, typer.Argument(help="picture to write (*.png)")],
-         value: Annotated[str, typer.Option(help="result to show")] = "",
-         x: Annotated[str, typer.Option(help="column along x")] = "",
-         y: Annotated[str, typer.Option(help="column along y: a heat map")] = "",
-         by: Annotated[str, typer.Option(help="a line for each of its values")] = "",
-         pair: Annotated[list[str] | None, typer.Option("--pair", help="column of a picture of pairs; repeat")] = None,
-         ) -> None:
-    """Draw a sweep: --x --y --value (heat map), --x --value [--by] (lines), or --pair twice or more."""
+def plot(
+    store: StorePath,
+    out: Annotated[Path, typer.Argument(help="picture to write (*.png)")],
+    value: Annotated[str, typer.Option(help="result to show")] = "",
+    x: Annotated[str, typer.Option(help="column along x")] = "",
+    y: Annotated[str, typer.Option(help="column along y: a heat map")] = "",
+    by: Annotated[str, typer.Option(help="a line for each of its values")] = "",
+    pair: Annotated[
+        list[str] | None, typer.Option("--pair", help="column of a picture of pairs; repeat")
+    ] = None,
+) -> None:
+    """Draw a sweep: --x --y --value (heat map), --x --value [--by] (lines), or --pair twice or
+    more."""
     from trajopt.report.sweeps import draw
 
     draw(store, out, value=value, x=x, y=y, by=by, pair=pair)
@@ -205,16 +275,28 @@ def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> 
 
     place = open_store(store)
     left = len(missing(plan.table, place, retry_failed=retry_failed))
-    console.print(f"{plan.title}: {len(plan.table)} cases, {left} to run on {engine.name}; store {store}")
+    console.print(
+        f"{plan.title}: {len(plan.table)} cases, {left} to run on {engine.name}; store {store}"
+    )
     with _ending_cleanly(), _bar(left) as report:
-        sweep(plan.table, plan.run, executor=engine, store=place, time_limit=plan.time_limit,
-              memory_limit=plan.memory_limit, retry_failed=retry_failed, source=plan.text, progress=report)
+        sweep(
+            plan.table,
+            plan.run,
+            executor=engine,
+            store=place,
+            time_limit=plan.time_limit,
+            memory_limit=plan.memory_limit,
+            retry_failed=retry_failed,
+            source=plan.text,
+            progress=report,
+        )
     console.print(", ".join(f"{count} {name}" for name, count in place.counts().items()))
     _print_errors(place)
 
 
 def _dry_run(plan: SweepPlan, workers: int) -> None:
-    """Count, first cases, and the time that three sampled cases take, in a store that is thrown away."""
+    """Count, first cases, and the time that three sampled cases take, in a store that is thrown
+    away."""
     import tempfile
 
     import numpy as np
@@ -227,18 +309,31 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
     first = plan.table.take(np.arange(min(_SHOWN, len(plan.table)))).rows()
     shown = Table("case", *plan.table.columns)
     for case in first:
-        shown.add_row(case.id[:12], *(f"{v:.6g}" if isinstance(v, float) else str(v) for v in case.values.values()))
+        shown.add_row(
+            case.id[:12],
+            *(f"{v:.6g}" if isinstance(v, float) else str(v) for v in case.values.values()),
+        )
     console.print(shown)
     with tempfile.TemporaryDirectory() as folder, _ending_cleanly():
-        store = sweep(sampled(plan.table), plan.run, executor=1, store=Path(folder) / "trial",
-                      time_limit=plan.time_limit, memory_limit=plan.memory_limit)
+        store = sweep(
+            sampled(plan.table),
+            plan.run,
+            executor=1,
+            store=Path(folder) / "trial",
+            time_limit=plan.time_limit,
+            memory_limit=plan.memory_limit,
+        )
         frame = store.frame(["run_seconds", "error", "error_message"])
     seconds = float(frame["run_seconds"].median())
     count = workers or available_processors()
-    console.print(f"three sampled cases took {', '.join(f'{s:.3g} s' for s in frame['run_seconds'])}; "
-                  f"about {_duration(seconds * len(plan.table) / count)} on {count} workers")
+    console.print(
+        f"three sampled cases took {', '.join(f'{s:.3g} s' for s in frame['run_seconds'])}; "
+        f"about {_duration(seconds * len(plan.table) / count)} on {count} workers"
+    )
     for _, row in frame[frame["status"] != "done"].iterrows():
-        console.print(f"[red]{row['status']}[/red] {row['case'][:12]}: {row['error']}: {row['error_message']}")
+        console.print(
+            f"[red]{row['status']}[/red] {row['case'][:12]}: {row['error']}: {row['error_message']}"
+        )
 
 
 def _print_errors(store: Store) -> None:
@@ -246,7 +341,9 @@ def _print_errors(store: Store) -> None:
     failed = frame[frame["status"] != "done"]
     if failed.empty:
         return
-    shown = Table("cases", "error", "first message", "first case", title="not done", title_justify="left")
+    shown = Table(
+        "cases", "error", "first message", "first case", title="not done", title_justify="left"
+    )
     for error, group in failed.groupby("error"):
         message, case = group["error_message"].iloc[0], group["case"].iloc[0]
         shown.add_row(str(len(group)), str(error), str(message)[:100], case[:12])
@@ -287,9 +384,15 @@ def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
     """Progress with rate and remaining time on a terminal; a line a minute where there is none."""
     from rich import progress as bars
 
-    bar = bars.Progress(bars.TextColumn("{task.fields[failed]}"), bars.BarColumn(), bars.MofNCompleteColumn(),
-                        bars.TextColumn("{task.fields[rate]}"), bars.TimeElapsedColumn(),
-                        console=Console(stderr=True), disable=not sys.stderr.isatty())
+    bar = bars.Progress(
+        bars.TextColumn("{task.fields[failed]}"),
+        bars.BarColumn(),
+        bars.MofNCompleteColumn(),
+        bars.TextColumn("{task.fields[rate]}"),
+        bars.TimeElapsedColumn(),
+        console=Console(stderr=True),
+        disable=not sys.stderr.isatty(),
+    )
     task: Any = bar.add_task("", total=total, failed="", rate="")
     said = [time.monotonic()]
 
@@ -298,10 +401,16 @@ def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
         rate = now.finished / max(now.seconds, 1e-9)
         left = now.remaining_seconds
         text = f"{rate:.3g} cases/s, {_duration(left) if left is not None else '?'} left"
-        bar.update(task, completed=now.finished, failed=f"{failed} failed" if failed else "", rate=text)
+        bar.update(
+            task, completed=now.finished, failed=f"{failed} failed" if failed else "", rate=text
+        )
         if not sys.stderr.isatty() and time.monotonic() - said[0] > 60:
             said[0] = time.monotonic()
-            print(f"{now.finished} of {now.total}, {failed} failed, {text}", file=sys.stderr, flush=True)
+            print(
+                f"{now.finished} of {now.total}, {failed} failed, {text}",
+                file=sys.stderr,
+                flush=True,
+            )
 
     with bar:
         yield report

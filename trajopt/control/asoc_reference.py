@@ -1,5 +1,5 @@
-"""What a tracked robot should do: positions and velocities over time along a closed or open path, and
-whether the ground asks more tilt of the modules than their pivots allow."""
+"""What a tracked robot should do: positions and velocities over time along a closed or open path,
+and whether the ground asks more tilt of the modules than their pivots allow."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ _SAMPLES = 0.01  # s between samples of a planned motion, chosen
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """Positions (n, 2) m and velocities (n, 2) m/s at times (n,) s; a velocity holds until the next time."""
+    """Positions (n, 2) m and velocities (n, 2) m/s at times (n,) s; a velocity holds until the next
+    time."""
 
     times: Array
     positions: Array
@@ -41,7 +42,9 @@ class Reference:
 
     def at(self, moment: float) -> tuple[Array, Array]:
         """Position and velocity wanted at a time, s; at rest at the end."""
-        i = int(np.clip(np.searchsorted(self.times, moment, side="right") - 1, 0, len(self.times) - 1))
+        i = int(
+            np.clip(np.searchsorted(self.times, moment, side="right") - 1, 0, len(self.times) - 1)
+        )
         place = [float(np.interp(moment, self.times, self.positions[:, k])) for k in (0, 1)]
         return np.array(place), self.velocities[i].copy()
 
@@ -66,12 +69,16 @@ def constant_speed(corners: ArrayLike, speed: float = SPEED) -> Reference:
     sides = np.diff(points, axis=0)
     length = np.linalg.norm(sides, axis=1)
     times = np.concatenate([[0.0], np.cumsum(length / speed)])
-    return Reference(times, points, np.vstack([sides / length[:, None] * speed, np.zeros(2)]), points)
+    return Reference(
+        times, points, np.vstack([sides / length[:, None] * speed, np.zeros(2)]), points
+    )
 
 
-def planned_speed(corners: ArrayLike, speed: float = SPEED, acceleration: float = PLANNED_ACCELERATION) -> Reference:
-    """The improvement: each side timed by ``time_scale`` under speed and acceleration limits, from rest to
-    rest, since a sharp corner allows no speed."""
+def planned_speed(
+    corners: ArrayLike, speed: float = SPEED, acceleration: float = PLANNED_ACCELERATION
+) -> Reference:
+    """The improvement: each side timed by ``time_scale`` under speed and acceleration limits, from
+    rest to rest, since a sharp corner allows no speed."""
     points = _checked(corners)
     limits = (Speed(speed), Acceleration(acceleration, acceleration))
     start, parts = 0.0, []
@@ -86,10 +93,14 @@ def planned_speed(corners: ArrayLike, speed: float = SPEED, acceleration: float 
     return Reference(times, positions, velocities, points)
 
 
-def require_pivots(geometry: AsocGeometry, ground: HeightMap, reference: Reference, *, every: float = 0.02) -> float:
-    """Largest tilt (rad) that the ground asks of a module along the path, body level, modules trailing.
+def require_pivots(
+    geometry: AsocGeometry, ground: HeightMap, reference: Reference, *, every: float = 0.02
+) -> float:
+    """Largest tilt (rad) that the ground asks of a module along the path, body level, modules
+    trailing.
 
-    Raises InfeasibleError, with place (m along the path) and angle, where it is more than eq. 8 allows.
+    Raises InfeasibleError, with place (m along the path) and angle, where it is more than eq. 8
+    allows.
     """
     allowed = float(largest_pivot(geometry.offset, geometry.split, geometry.wheel_radius))
     worst, done = 0.0, 0.0
@@ -99,22 +110,34 @@ def require_pivots(geometry: AsocGeometry, ground: HeightMap, reference: Referen
         centres = a + s[:, None] * (b - a) / length
         local = wheel_positions(geometry, np.full(geometry.modules, heading))
         places = (local + centres[:, None, None]).reshape(-1, 2)
-        heights = wheel_contact(ground, places[:, 0], places[:, 1], heading, geometry.wheel_radius).centre_height
-        tilt = np.abs(np.arctan(np.diff(heights.reshape(-1, 2), axis=1) / geometry.split)).reshape(len(s), -1)
+        heights = wheel_contact(
+            ground, places[:, 0], places[:, 1], heading, geometry.wheel_radius
+        ).centre_height
+        tilt = np.abs(np.arctan(np.diff(heights.reshape(-1, 2), axis=1) / geometry.split)).reshape(
+            len(s), -1
+        )
         i, module = np.unravel_index(int(np.argmax(tilt)), tilt.shape)
         if tilt[i, module] > allowed:
             x, y = places.reshape(len(s), -1, 2, 2)[i, module].mean(axis=0)
-            raise InfeasibleError("pivot", done + float(s[i]),
-                                  f"module {module} at ({x:.3g}, {y:.3g}) m must tilt "
-                                  f"{np.degrees(tilt[i, module]):.3g} deg, the pivots allow "
-                                  f"{np.degrees(allowed):.3g} deg")
+            raise InfeasibleError(
+                "pivot",
+                done + float(s[i]),
+                f"module {module} at ({x:.3g}, {y:.3g}) m must tilt "
+                f"{np.degrees(tilt[i, module]):.3g} deg, the pivots allow "
+                f"{np.degrees(allowed):.3g} deg",
+            )
         worst, done = max(worst, float(tilt[i, module])), done + length
     return worst
 
 
 def _checked(corners: ArrayLike) -> Array:
     points = np.asarray(corners, dtype=np.float64)
-    if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.all(np.isfinite(points)):
+    if (
+        points.ndim != 2
+        or points.shape[1] != 2
+        or len(points) < 2
+        or not np.all(np.isfinite(points))
+    ):
         raise ArgumentError("corners", points.tolist(), "finite points, shape (k, 2), k >= 2, m")
     if np.any(np.linalg.norm(np.diff(points, axis=0), axis=1) == 0):
         raise ArgumentError("corners", points.tolist(), "neighbouring corners that differ")

@@ -1,6 +1,7 @@
 """Wheel speed commands of a differential drive, and what the robot did with them.
 
-Commands are linear wheel speeds (m/s) held over one sample time, as thesis 004 hands them over (section 3.5).
+Commands are linear wheel speeds (m/s) held over one sample time, as thesis 004 hands them over
+(section 3.5).
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Commands:
 
 
 class StudyRow(NamedTuple):
-    """One sample time: error norm of the speed (m/s, eq. 3.10) and error of the final position (m, eq. 3.11)."""
+    """One sample time: error norm of the speed (m/s, eq. 3.10) and error of the final position (m,
+    eq. 3.11)."""
 
     sample_time: float
     speed_error: float
@@ -50,7 +52,8 @@ class StudyRow(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What a log says of a plan, as Tables 3 to 18 of thesis 004. Norms are root mean squares (eq. 3.10)."""
+    """What a log says of a plan, as Tables 3 to 18 of thesis 004. Norms are root mean squares (eq.
+    3.10)."""
 
     speed_error: float  # m/s
     heading_error: float  # rad
@@ -60,25 +63,34 @@ class Comparison(NamedTuple):
 
 
 def half_track(robot: Platform) -> float:
-    """Half the distance between the wheels, m. Raises ArgumentError unless the robot has two driven wheels."""
+    """Half the distance between the wheels, m. Raises ArgumentError unless the robot has two driven
+    wheels."""
     if robot.holonomic or len(robot.wheels) != 2:
-        raise ArgumentError("robot", robot.name, "a differential drive: two fixed wheels, left and right")
+        raise ArgumentError(
+            "robot", robot.name, "a differential drive: two fixed wheels, left and right"
+        )
     return float(abs(robot.wheels[0].position[1]))
 
 
-def commands(trajectory: Trajectory, sample_time: float, *, rule: Literal["held", "mean"] = "mean") -> Commands:
+def commands(
+    trajectory: Trajectory, sample_time: float, *, rule: Literal["held", "mean"] = "mean"
+) -> Commands:
     """Wheel speeds every ``sample_time`` seconds.
 
-    "held": the speed at the start of each interval (eqs. 3.7 to 3.9, as the thesis digitises). "mean": the
-    wheel's turn over the interval divided by its length, so that the wheels end at the planned angles. The
-    last interval is stretched to whole samples and holds what is left. Raises ArgumentError for a sample time
-    that is not positive, or a robot that is no differential drive.
+    "held": the speed at the start of each interval (eqs. 3.7 to 3.9, as the thesis digitises).
+    "mean": the wheel's turn over the interval divided by its length, so that the wheels end at the
+    planned angles. The last interval is stretched to whole samples and holds what is left. Raises
+    ArgumentError for a sample time that is not positive, or a robot that is no differential drive.
     """
     if not (np.isfinite(sample_time) and sample_time > 0):
         raise ArgumentError("sample_time", sample_time, "a finite time > 0 s")
     if trajectory.duration / sample_time > _MOST_COMMANDS:
-        raise ArgumentError("sample_time", sample_time, f"at most {_MOST_COMMANDS:,} commands: "
-                            f"{trajectory.duration / _MOST_COMMANDS:.2g} s or more")
+        raise ArgumentError(
+            "sample_time",
+            sample_time,
+            f"at most {_MOST_COMMANDS:,} commands: "
+            f"{trajectory.duration / _MOST_COMMANDS:.2g} s or more",
+        )
     robot = _robot(trajectory)
     half_track(robot)
     count = max(int(np.ceil(trajectory.duration / sample_time - 1e-9)), 1)
@@ -95,7 +107,8 @@ def commands(trajectory: Trajectory, sample_time: float, *, rule: Literal["held"
 
 
 def driven(orders: Commands, robot: Platform, start: Sequence[float], times: Array) -> Array:
-    """(N, 3): poses (m, m, rad) at ``times`` (N,) s of a drive that executes the commands without slip.
+    """(N, 3): poses (m, m, rad) at ``times`` (N,) s of a drive that executes the commands without
+    slip.
 
     Exact: wheel speeds are constant in an interval, so the robot moves on an arc.
     """
@@ -108,12 +121,15 @@ def driven(orders: Commands, robot: Platform, start: Sequence[float], times: Arr
     pose[1:, :2] = np.asarray(start[:2]) + np.cumsum(moved, axis=0)
     i = np.clip(np.searchsorted(orders.times, times, side="right") - 1, 0, len(v) - 1)
     after = np.clip(times - orders.times[i], 0.0, orders.sample_time)
-    here = np.column_stack([pose[i, :2] + _arc(pose[i, 2], v[i], w[i], after), pose[i, 2] + w[i] * after])
+    here = np.column_stack(
+        [pose[i, :2] + _arc(pose[i, 2], v[i], w[i], after), pose[i, 2] + w[i] * after]
+    )
     return np.asarray(here)
 
 
-def sample_time_study(trajectory: Trajectory, sample_times: Sequence[float],
-                      rule: Literal["held", "mean"] = "held") -> list[StudyRow]:
+def sample_time_study(
+    trajectory: Trajectory, sample_times: Sequence[float], rule: Literal["held", "mean"] = "held"
+) -> list[StudyRow]:
     """Tables 1 and 2 of thesis 004 without its disturbances: what digitising alone costs."""
     robot, rows = _robot(trajectory), []
     start, goal = trajectory.at([0.0, trajectory.duration]).pose
@@ -141,11 +157,12 @@ def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
 
 
 def compare_log(trajectory: Trajectory, file: str | FilePath) -> Comparison:
-    """Compare a plan with the log of what the robot did: CSV with columns t, x, y, yaw, v (s, m, m, rad, m/s).
+    """Compare a plan with the log of what the robot did: CSV with columns t, x, y, yaw, v (s, m, m,
+    rad, m/s).
 
-    Speeds are compared at the log's times, headings at equal travelled distance share, the goal by place.
-    Raises ArgumentError for a missing column, fewer than two rows, or numbers that are not finite and rising
-    in time.
+    Speeds are compared at the log's times, headings at equal travelled distance share, the goal by
+    place. Raises ArgumentError for a missing column, fewer than two rows, or numbers that are not
+    finite and rising in time.
     """
     log = _read_log(FilePath(file))
     t = log[:, 0]
@@ -155,9 +172,12 @@ def compare_log(trajectory: Trajectory, file: str | FilePath) -> Comparison:
     heading = _folded(log[:, 3] - planned.pose[:, 2])
     steps = np.hypot(np.diff(log[:, 1]), np.diff(log[:, 2]))
     return Comparison(
-        float(np.sqrt(np.mean((log[:, 4] - speed) ** 2))), float(np.sqrt(np.mean(heading**2))),
+        float(np.sqrt(np.mean((log[:, 4] - speed) ** 2))),
+        float(np.sqrt(np.mean(heading**2))),
         float(np.hypot(*(log[-1, 1:3] - planned.pose[-1, :2]))),
-        float(t[-1] - trajectory.duration), float(steps.sum()))
+        float(t[-1] - trajectory.duration),
+        float(steps.sum()),
+    )
 
 
 def _read_log(path: FilePath) -> Array:
@@ -166,8 +186,11 @@ def _read_log(path: FilePath) -> Array:
             reader = csv.DictReader(line for line in stream if not line.startswith("#"))
             missing = [name for name in LOG_COLUMNS if name not in (reader.fieldnames or ())]
             if missing:
-                raise ArgumentError("log", str(path), "columns " + ", ".join(LOG_COLUMNS)
-                                    + " (missing: " + ", ".join(missing) + ")")
+                raise ArgumentError(
+                    "log",
+                    str(path),
+                    "columns " + ", ".join(LOG_COLUMNS) + " (missing: " + ", ".join(missing) + ")",
+                )
             rows = [[float(row[name]) for name in LOG_COLUMNS] for row in reader]
     except FileNotFoundError:
         raise ArgumentError("log", str(path), "an existing CSV file") from None
@@ -176,14 +199,23 @@ def _read_log(path: FilePath) -> Array:
             raise
         raise ArgumentError("log", str(error), "numbers in every column") from None
     log = np.array(rows, dtype=np.float64).reshape(-1, len(LOG_COLUMNS))
-    if len(log) < 2 or not np.all(np.isfinite(log)) or np.any(np.diff(log[:, 0]) <= 0) or log[0, 0] < 0:
-        raise ArgumentError("log", str(path), "two or more rows of finite numbers, times rising from >= 0")
+    if (
+        len(log) < 2
+        or not np.all(np.isfinite(log))
+        or np.any(np.diff(log[:, 0]) <= 0)
+        or log[0, 0] < 0
+    ):
+        raise ArgumentError(
+            "log", str(path), "two or more rows of finite numbers, times rising from >= 0"
+        )
     return log
 
 
 def _robot(trajectory: Trajectory) -> Platform:
     if trajectory.robot is None:
-        raise ArgumentError("trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))")
+        raise ArgumentError(
+            "trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))"
+        )
     return trajectory.robot
 
 

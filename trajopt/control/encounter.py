@@ -1,7 +1,8 @@
 """What a replanner knows of a path and of the things that may cross it.
 
-Everything is written over one coordinate, the path parameter s: where the robot's outline stands, how far its
-fastest corner travels, how fast the plan goes there, how hard the robot can brake and accelerate.
+Everything is written over one coordinate, the path parameter s: where the robot's outline stands,
+how far its fastest corner travels, how fast the plan goes there, how hard the robot can brake and
+accelerate.
 """
 
 from __future__ import annotations
@@ -44,16 +45,18 @@ class Obstacle:
                 raise ArgumentError(f"obstacle.{name}", getattr(self, name), "a finite value >= 0")
 
 
-World = Callable[[float, Array], Sequence[Obstacle]]  # the true obstacles at time t (s), robot at pose (3,)
+World = Callable[
+    [float, Array], Sequence[Obstacle]
+]  # the true obstacles at time t (s), robot at pose (3,)
 
 
 @dataclass(frozen=True)
 class Visitor:
     """A disc that comes in the robot's way once. Lengths m, times s, speed m/s.
 
-    At time ``appears`` its nearest point is ``distance`` ahead of the outline's front and its centre ``aside``
-    to the left of the robot's middle; it then walks across at ``speed`` (to the left > 0) on a straight track
-    and is gone after ``stays``.
+    At time ``appears`` its nearest point is ``distance`` ahead of the outline's front and its
+    centre ``aside`` to the left of the robot's middle; it then walks across at ``speed`` (to the
+    left > 0) on a straight track and is gone after ``stays``.
     """
 
     appears: float
@@ -72,11 +75,14 @@ class Visitor:
                 raise ArgumentError(f"visitor.{name}", getattr(self, name), "a finite value")
 
 
-def visited_world(visitors: Sequence[Visitor], outline: Array, *, speed_bound: float | None = None) -> World:
-    """The world of ``visitors``, for one run: where each comes is told by the robot's pose when it appears.
+def visited_world(
+    visitors: Sequence[Visitor], outline: Array, *, speed_bound: float | None = None
+) -> World:
+    """The world of ``visitors``, for one run: where each comes is told by the robot's pose when it
+    appears.
 
-    ``outline`` (K, 2), m, body frame. An obstacle may move by at most ``speed_bound`` (m/s) for all the robot
-    knows; None: by its own speed.
+    ``outline`` (K, 2), m, body frame. An obstacle may move by at most ``speed_bound`` (m/s) for all
+    the robot knows; None: by its own speed.
     """
     front = float(np.asarray(outline)[:, 0].max())
     placed: dict[int, tuple[Array, Array]] = {}
@@ -88,12 +94,21 @@ def visited_world(visitors: Sequence[Visitor], outline: Array, *, speed_bound: f
             if not 0.0 <= since < visitor.stays:
                 continue
             if i not in placed:
-                ahead, left = (np.array([np.cos(pose[2] + turn), np.sin(pose[2] + turn)]) for turn in (0, np.pi / 2))
-                placed[i] = (pose[:2] + (front + visitor.distance + visitor.radius) * ahead + visitor.aside * left,
-                             visitor.speed * left)
+                ahead, left = (
+                    np.array([np.cos(pose[2] + turn), np.sin(pose[2] + turn)])
+                    for turn in (0, np.pi / 2)
+                )
+                placed[i] = (
+                    pose[:2]
+                    + (front + visitor.distance + visitor.radius) * ahead
+                    + visitor.aside * left,
+                    visitor.speed * left,
+                )
             centre = placed[i][0] + since * placed[i][1]
             bound = abs(visitor.speed) if speed_bound is None else speed_bound
-            found.append(Obstacle((float(centre[0]), float(centre[1])), visitor.radius, (0.0, 0.0), bound))
+            found.append(
+                Obstacle((float(centre[0]), float(centre[1])), visitor.radius, (0.0, 0.0), bound)
+            )
         return found
 
     return world
@@ -105,7 +120,9 @@ class Course:
 
     s: Array
     pose: Array  # (M, 3) x, y, yaw of the body origin
-    square: Array  # (M,) m^2/s^2, the plan's speed squared (linear in s where acceleration is constant)
+    square: (
+        Array  # (M,) m^2/s^2, the plan's speed squared (linear in s where acceleration is constant)
+    )
     travel: Array  # (M,) m, travelled by the fastest point of the outline since the start
     braking: Array  # (M,) m/s^2 > 0, possible here at any speed up to the plan's
     acceleration: Array  # (M,) m/s^2 >= 0, the same
@@ -133,26 +150,35 @@ class Course:
         return np.interp(s, self.s, self.travel)
 
 
-def course(trajectory: Trajectory, robot: Platform, *, limits: Sequence[Limit] | None = None) -> Course:
+def course(
+    trajectory: Trajectory, robot: Platform, *, limits: Sequence[Limit] | None = None
+) -> Course:
     """Tables for replanning along ``trajectory``; ``robot`` gives the outline.
 
-    ``limits`` say how hard the replanner may brake and accelerate; None: those of the plan. A plan that uses all
-    the friction in a bend leaves nothing to brake with: time it with less than what is allowed here. Raises
-    ArgumentError where the robot cannot brake at all at some speed up to the plan's (braking rows at s'' < 0 leave
-    nothing): then no replanner can promise a stop.
+    ``limits`` say how hard the replanner may brake and accelerate; None: those of the plan. A plan
+    that uses all the friction in a bend leaves nothing to brake with: time it with less than what
+    is allowed here. Raises ArgumentError where the robot cannot brake at all at some speed up to
+    the plan's (braking rows at s'' < 0 leave nothing): then no replanner can promise a stop.
     """
     count = max(int(np.ceil(trajectory.path.length / _SPACING)) + 1, 3)
     s = np.linspace(0.0, trajectory.path.length, count)
     samples = sample_path(trajectory.path, s)
     square = np.interp(s, trajectory.s, trajectory.sd**2)
-    rows = [limit.rows(samples, trajectory.robot) for limit in (trajectory.limits if limits is None else limits)]
+    rows = [
+        limit.rows(samples, trajectory.robot)
+        for limit in (trajectory.limits if limits is None else limits)
+    ]
     highest, lowest = _acceleration_range(rows, square)
     if not lowest.max() < 0:
         place = float(s[int(np.argmax(lowest))])
-        raise ArgumentError("trajectory", f"s = {place:.4g} m", "a plan from which the robot can brake everywhere")
+        raise ArgumentError(
+            "trajectory", f"s = {place:.4g} m", "a plan from which the robot can brake everywhere"
+        )
     corners: Array = np.asarray(robot.footprint, dtype=np.float64)
     yaw_rate, forward = samples.twist[:, 2:], samples.twist[:, :1]
-    moves = np.hypot(forward - yaw_rate * corners[:, 1], samples.twist[:, 1:2] + yaw_rate * corners[:, 0])
+    moves = np.hypot(
+        forward - yaw_rate * corners[:, 1], samples.twist[:, 1:2] + yaw_rate * corners[:, 0]
+    )
     fastest = moves.max(axis=1)
     travel = np.concatenate([[0.0], np.cumsum((fastest[1:] + fastest[:-1]) / 2 * np.diff(s))])
     pose = np.column_stack([samples.position[:, :2], samples.yaw])
@@ -177,13 +203,17 @@ def _acceleration_range(rows: list[Rows], square: Array) -> tuple[Array, Array]:
 
 
 def clearance(poses: Array, outline: Array, centres: Array, radii: Array) -> Array:
-    """(N,): least distance, m, between the outline at N poses and N discs (centres (N, 2), radii (N,)).
+    """(N,): least distance, m, between the outline at N poses and N discs (centres (N, 2), radii
+    (N,)).
 
-    Negative where they overlap (minus the radius at most; minus the depth where the centre is inside).
+    Negative where they overlap (minus the radius at most; minus the depth where the centre is
+    inside).
     """
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     d = centres - poses[:, :2]
-    local = np.stack([cos * d[:, 0] + sin * d[:, 1], -sin * d[:, 0] + cos * d[:, 1]], axis=1)[:, None, :]
+    local = np.stack([cos * d[:, 0] + sin * d[:, 1], -sin * d[:, 0] + cos * d[:, 1]], axis=1)[
+        :, None, :
+    ]
     edge = np.roll(outline, -1, axis=0) - outline
     rel = local - outline[None]
     share = np.clip(np.sum(rel * edge, axis=2) / np.sum(edge * edge, axis=1), 0.0, 1.0)
@@ -193,13 +223,16 @@ def clearance(poses: Array, outline: Array, centres: Array, radii: Array) -> Arr
     return np.asarray(np.where(inside, -distance, distance) - radii)
 
 
-def safe_speed(sensor_range: float, delay: float, braking: float, *, obstacle_speed: float = 0.0) -> float:
-    """Greatest speed (m/s) from which the robot stops before what its sensor sees first at its range.
+def safe_speed(
+    sensor_range: float, delay: float, braking: float, *, obstacle_speed: float = 0.0
+) -> float:
+    """Greatest speed (m/s) from which the robot stops before what its sensor sees first at its
+    range.
 
-    v delay + v^2 / (2 braking) + w (delay + v / braking) <= range, with ``delay`` (s) from one scan to the
-    reaction on the next, ``braking`` (m/s^2) what the slope leaves, w = ``obstacle_speed`` towards the robot
-    (m/s). Thesis 004, eq. 2.26, is the first term alone. 0 where even standing still is not far enough.
-    Raises ArgumentError for values that are not positive.
+    v delay + v^2 / (2 braking) + w (delay + v / braking) <= range, with ``delay`` (s) from one scan
+    to the reaction on the next, ``braking`` (m/s^2) what the slope leaves, w = ``obstacle_speed``
+    towards the robot (m/s). Thesis 004, eq. 2.26, is the first term alone. 0 where even standing
+    still is not far enough. Raises ArgumentError for values that are not positive.
     """
     for name, value in (("sensor_range", sensor_range), ("delay", delay), ("braking", braking)):
         if not (np.isfinite(value) and value > 0):

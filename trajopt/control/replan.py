@@ -1,10 +1,11 @@
 """On-line replanning among moving obstacles: slow down, stop, resume, along an unchanged path.
 
-Every scan the replanner chooses the speeds of one more cycle and, behind them, a full brake to rest. A choice
-is accepted only if the outline, driven through committed motion, cycle and brake, meets none of the places
-that a seen obstacle can reach by then, and if nothing that was beyond the sensor's range can be met either.
-Otherwise the brake accepted one cycle earlier is executed: so if the first state is safe, every state is
-(passive safety: nothing is hit while the robot moves). The path never changes, so the distance is conserved.
+Every scan the replanner chooses the speeds of one more cycle and, behind them, a full brake to
+rest. A choice is accepted only if the outline, driven through committed motion, cycle and brake,
+meets none of the places that a seen obstacle can reach by then, and if nothing that was beyond the
+sensor's range can be met either. Otherwise the brake accepted one cycle earlier is executed: so if
+the first state is safe, every state is (passive safety: nothing is hit while the robot moves). The
+path never changes, so the distance is conserved.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from trajopt.errors import ArgumentError
 Array = NDArray[np.float64]
 
 TIME_STEP = 0.02  # s between samples of a plan; chosen
-# Shares of full braking (< 0) and full acceleration (> 0) tried a cycle; chosen: fine near a constant speed, so that
-# the safe speed is approached and not jumped across at every scan.
+# Shares of full braking (< 0) and full acceleration (> 0) tried a cycle; chosen: fine near a
+# constant speed, so that the safe speed is approached and not jumped across at every scan.
 _LEVELS = np.array([-1.0, -0.5, -0.25, -0.1, -0.03, 0.0, 0.1, 0.4, 1.0])
 _CREEP = 0.05  # m/s; the halving rule stops below it; chosen
 _STILL = 0.02  # m/s, chosen: a real robot below it counts as standing (contacts give way by less)
@@ -32,7 +33,8 @@ _PLACE = 1e-6  # m; nearer than this to the end counts as arrived
 
 @dataclass(frozen=True)
 class Sensor:
-    """``reach`` (m) around the outline, a scan every ``scan_time`` (s), effect after ``reaction_time`` (s).
+    """``reach`` (m) around the outline, a scan every ``scan_time`` (s), effect after
+    ``reaction_time`` (s).
 
     ``unseen_speed`` (m/s) bounds how fast something that is not yet seen may come.
     """
@@ -53,7 +55,8 @@ class Sensor:
 
 @dataclass(frozen=True, eq=False)
 class SpeedPlan:
-    """Path parameter ``s`` (m) and speed ``v`` (m/s), arrays (N,), every TIME_STEP from time ``start`` (s).
+    """Path parameter ``s`` (m) and speed ``v`` (m/s), arrays (N,), every TIME_STEP from time
+    ``start`` (s).
 
     It ends at rest and stays there.
     """
@@ -64,7 +67,9 @@ class SpeedPlan:
 
     def sampled(self, first: float, count: int) -> tuple[Array, Array]:
         """s and v at ``count`` samples from time ``first`` on."""
-        index = np.clip(round((first - self.start) / TIME_STEP) + np.arange(count), 0, len(self.s) - 1)
+        index = np.clip(
+            round((first - self.start) / TIME_STEP) + np.arange(count), 0, len(self.s) - 1
+        )
         return self.s[index], self.v[index]
 
 
@@ -73,11 +78,14 @@ def at_rest(now: float, s: float = 0.0) -> SpeedPlan:
     return SpeedPlan(now, np.array([s]), np.zeros(1))
 
 
-def replan(where: Course, sensor: Sensor, current: SpeedPlan, now: float, seen: Sequence[Obstacle]) -> SpeedPlan:
-    """The plan from time ``now`` (a scan) on; ``current`` is the one under way, ``seen`` what the scan shows.
+def replan(
+    where: Course, sensor: Sensor, current: SpeedPlan, now: float, seen: Sequence[Obstacle]
+) -> SpeedPlan:
+    """The plan from time ``now`` (a scan) on; ``current`` is the one under way, ``seen`` what the
+    scan shows.
 
-    The fastest accepted choice for the cycle that starts after the reaction time; else ``current`` itself,
-    which ends in a brake. ``seen`` must hold every obstacle within reach of the outline.
+    The fastest accepted choice for the cycle that starts after the reaction time; else ``current``
+    itself, which ends in a brake. ``seen`` must hold every obstacle within reach of the outline.
     """
     delay = round(sensor.reaction_time / TIME_STEP)
     cycle = max(round(sensor.scan_time / TIME_STEP), 1)
@@ -94,17 +102,19 @@ def replan(where: Course, sensor: Sensor, current: SpeedPlan, now: float, seen: 
 
 
 def stops_in_time(where: Course, sensor: Sensor, plan: SpeedPlan, seen: Sequence[Obstacle]) -> bool:
-    """Whether ``plan``, from its start to rest, is clear of all that it knows and of all that it cannot see."""
+    """Whether ``plan``, from its start to rest, is clear of all that it knows and of all that it
+    cannot see."""
     return _accepted(where, sensor, plan.s, plan.v, seen)
 
 
-def halving_plan(where: Course, sensor: Sensor, current: SpeedPlan, now: float,
-                 seen: Sequence[Obstacle]) -> SpeedPlan:
+def halving_plan(
+    where: Course, sensor: Sensor, current: SpeedPlan, now: float, seen: Sequence[Obstacle]
+) -> SpeedPlan:
     """The thesis's rule (section 3.6): half a cycle on, then half the speed; resume by doubling.
 
-    An obstacle counts as in the way when it is within reach of the outline ahead. It promises nothing: the
-    stopping distance is not looked at. The recovery is ambiguous in the thesis; here the speed doubles every
-    cycle, from a creep, up to the plan's.
+    An obstacle counts as in the way when it is within reach of the outline ahead. It promises
+    nothing: the stopping distance is not looked at. The recovery is ambiguous in the thesis; here
+    the speed doubles every cycle, from a creep, up to the plan's.
     """
     half = max(round(sensor.scan_time / 2 / TIME_STEP), 1)
     s0, v0 = (float(x[0]) for x in current.sampled(now, 1))
@@ -113,7 +123,9 @@ def halving_plan(where: Course, sensor: Sensor, current: SpeedPlan, now: float,
     s_list, v_list = [s0], [v0]
     drop = float(where.braking.min()) * TIME_STEP
     while wanted or v_list[-1] > 0:
-        v = wanted.pop(0) if wanted else max(v_list[-1] - drop, 0.0)  # behind the cycle: a full brake
+        v = (
+            wanted.pop(0) if wanted else max(v_list[-1] - drop, 0.0)
+        )  # behind the cycle: a full brake
         beyond = s_list[-1] + v * TIME_STEP
         if beyond < where.length:
             v = min(v, float(where.speed(np.array([beyond]))[0]))
@@ -123,10 +135,12 @@ def halving_plan(where: Course, sensor: Sensor, current: SpeedPlan, now: float,
 
 
 def _choices(where: Course, s: float, v: float, cycle: int) -> list[tuple[Array, Array]]:
-    """Continuations of (s, v), fastest first: one cycle at constant acceleration below the plan's speed, then
-    a full brake. Samples after the first."""
+    """Continuations of (s, v), fastest first: one cycle at constant acceleration below the plan's
+    speed, then a full brake. Samples after the first."""
     top = where.top_speed
-    reach = top * cycle * TIME_STEP + top**2 / (2 * where.braking.min()) + 0.1  # m, beyond cycle and brake
+    reach = (
+        top * cycle * TIME_STEP + top**2 / (2 * where.braking.min()) + 0.1
+    )  # m, beyond cycle and brake
     ahead = (where.s >= s - 0.1) & (where.s <= s + reach)
     braking = float(where.braking[ahead].min())
     forward = float(where.acceleration[ahead].min())
@@ -174,11 +188,12 @@ def _accepted(where: Course, sensor: Sensor, s: Array, v: Array, seen: Sequence[
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What an encounter was like, every TIME_STEP. ``pose`` (N, 3) is where the robot was and ``s``, ``v`` what
-    the plan asked for; ``gap`` (m) is the distance to the nearest obstacle there was (inf without one), ``hit``
-    whether it closed while the robot moved; ``kept`` whether every plan passed its own check and, at every
-    instant, the rest of the plan from where the robot really was came to rest clear of all that any obstacle
-    could do by then; ``slowest_replan`` the longest planning time, s of processor time."""
+    """What an encounter was like, every TIME_STEP. ``pose`` (N, 3) is where the robot was and
+    ``s``, ``v`` what the plan asked for; ``gap`` (m) is the distance to the nearest obstacle there
+    was (inf without one), ``hit`` whether it closed while the robot moved; ``kept`` whether every
+    plan passed its own check and, at every instant, the rest of the plan from where the robot
+    really was came to rest clear of all that any obstacle could do by then; ``slowest_replan`` the
+    longest planning time, s of processor time."""
 
     times: Array
     s: Array
@@ -195,22 +210,35 @@ Planner = Callable[[Course, Sensor, SpeedPlan, float, Sequence[Obstacle]], Speed
 Body = Callable[[SpeedPlan, float, Sequence[Obstacle]], Array]
 
 
-def run_encounter(where: Course, sensor: Sensor, world: World, *, planner: Planner = replan, longest: float,
-                  knows_velocity: bool = False, body: Body | None = None, allowance: float = 0.0,
-                  settle: float = 0.0) -> Run:
-    """Drive ``where`` among the obstacles of ``world(time, pose)`` until arrival, or for ``longest`` seconds.
+def run_encounter(
+    where: Course,
+    sensor: Sensor,
+    world: World,
+    *,
+    planner: Planner = replan,
+    longest: float,
+    knows_velocity: bool = False,
+    body: Body | None = None,
+    allowance: float = 0.0,
+    settle: float = 0.0,
+) -> Run:
+    """Drive ``where`` among the obstacles of ``world(time, pose)`` until arrival, or for
+    ``longest`` seconds.
 
-    ``world`` gives the true obstacles; each may move at most its deviation + |velocity|. The robot sees those
-    within reach at every scan, and with ``knows_velocity`` also their velocity; without it the whole speed
-    becomes deviation. ``body(plan, now, obstacles)`` moves the real robot one TIME_STEP on and returns its pose
-    (3,); None: it follows exactly. The planner keeps ``allowance`` (m) for how far it strays from the plan;
-    ``settle`` (s) is how long it is still driven after the plan has arrived. Raises ArgumentError for a
-    ``longest`` that is not positive, or an allowance that leaves nothing of the reach.
+    ``world`` gives the true obstacles; each may move at most its deviation + |velocity|. The robot
+    sees those within reach at every scan, and with ``knows_velocity`` also their velocity; without
+    it the whole speed becomes deviation. ``body(plan, now, obstacles)`` moves the real robot one
+    TIME_STEP on and returns its pose (3,); None: it follows exactly. The planner keeps
+    ``allowance`` (m) for how far it strays from the plan; ``settle`` (s) is how long it is still
+    driven after the plan has arrived. Raises ArgumentError for a ``longest`` that is not positive,
+    or an allowance that leaves nothing of the reach.
     """
     if not longest > 0:
         raise ArgumentError("longest", longest, "a time > 0 s")
     if not 0 <= allowance < sensor.reach:
-        raise ArgumentError("allowance", allowance, f"a length in [0, {sensor.reach:g}) m, the reach")
+        raise ArgumentError(
+            "allowance", allowance, f"a length in [0, {sensor.reach:g}) m, the reach"
+        )
     planned = replace(sensor, reach=sensor.reach - allowance)
     plan, slowest, kept, hit, settled = at_rest(0.0), 0.0, True, False, 0.0
     cycle = max(round(sensor.scan_time / TIME_STEP), 1)
@@ -220,8 +248,11 @@ def run_encounter(where: Course, sensor: Sensor, world: World, *, planner: Plann
     for i in range(int(np.ceil(longest / TIME_STEP))):
         now = i * TIME_STEP
         if i % cycle == 0:
-            seen = [_as_seen(o, knows_velocity, allowance) for o in things
-                    if _gap(where, pose, [o]) <= sensor.reach]
+            seen = [
+                _as_seen(o, knows_velocity, allowance)
+                for o in things
+                if _gap(where, pose, [o]) <= sensor.reach
+            ]
             begun = time.thread_time()
             plan = planner(where, planned, plan, now, seen)
             slowest = max(slowest, time.thread_time() - begun)
@@ -240,7 +271,17 @@ def run_encounter(where: Course, sensor: Sensor, world: World, *, planner: Plann
             break
     s_array, v_array, poses, gaps = (np.array(column) for column in zip(*log, strict=True))
     times: Array = TIME_STEP * np.arange(len(log), dtype=np.float64)
-    return Run(times, s_array, v_array, poses, gaps, hit, kept, bool(s_array[-1] >= where.length - 1e-3), slowest)
+    return Run(
+        times,
+        s_array,
+        v_array,
+        poses,
+        gaps,
+        hit,
+        kept,
+        bool(s_array[-1] >= where.length - 1e-3),
+        slowest,
+    )
 
 
 def _moved(log: list[tuple[float, float, Array, float]]) -> bool:
@@ -248,9 +289,11 @@ def _moved(log: list[tuple[float, float, Array, float]]) -> bool:
     return log[-1][1] > 0 or float(np.hypot(*(log[-1][2] - log[-2][2])[:2])) > _STILL * TIME_STEP
 
 
-def _stops_from(where: Course, plan: SpeedPlan, now: float, pose: Array, gap: float,
-                things: Sequence[Obstacle]) -> bool:
-    """Whether the rest of ``plan``, driven from where the robot really is, stays clear of ``things``."""
+def _stops_from(
+    where: Course, plan: SpeedPlan, now: float, pose: Array, gap: float, things: Sequence[Obstacle]
+) -> bool:
+    """Whether the rest of ``plan``, driven from where the robot really is, stays clear of
+    ``things``."""
     rest = len(plan.s) - round((now - plan.start) / TIME_STEP)
     s, v = plan.sampled(now, max(rest, 1))
     moving = np.flatnonzero(v > 0)
@@ -266,23 +309,47 @@ def _stops_from(where: Course, plan: SpeedPlan, now: float, pose: Array, gap: fl
     turn = pose[2] - poses[0, 2]  # the rest of the plan, moved to where the robot is
     cos, sin = np.cos(turn), np.sin(turn)
     d = poses[:, :2] - poses[0, :2]
-    real = np.column_stack([pose[0] + cos * d[:, 0] - sin * d[:, 1], pose[1] + sin * d[:, 0] + cos * d[:, 1],
-                            poses[:, 2] + turn])
-    return not any(np.any(clearance(real, where.outline,
-                                    np.asarray(thing.centre) + t[:, None] * np.asarray(thing.velocity),
-                                    thing.radius + thing.deviation * t) <= 0) for thing in things)
+    real = np.column_stack(
+        [
+            pose[0] + cos * d[:, 0] - sin * d[:, 1],
+            pose[1] + sin * d[:, 0] + cos * d[:, 1],
+            poses[:, 2] + turn,
+        ]
+    )
+    return not any(
+        np.any(
+            clearance(
+                real,
+                where.outline,
+                np.asarray(thing.centre) + t[:, None] * np.asarray(thing.velocity),
+                thing.radius + thing.deviation * t,
+            )
+            <= 0
+        )
+        for thing in things
+    )
 
 
 def _as_seen(thing: Obstacle, knows_velocity: bool, allowance: float) -> Obstacle:
     if knows_velocity:
         return replace(thing, radius=thing.radius + allowance)
-    return Obstacle(thing.centre, thing.radius + allowance, (0.0, 0.0),
-                    thing.deviation + float(np.hypot(*thing.velocity)))
+    return Obstacle(
+        thing.centre,
+        thing.radius + allowance,
+        (0.0, 0.0),
+        thing.deviation + float(np.hypot(*thing.velocity)),
+    )
 
 
 def _gap(where: Course, pose: Array, things: Sequence[Obstacle]) -> float:
     if not things:
         return float("inf")
     poses = np.repeat(pose[None], len(things), axis=0)
-    return float(clearance(poses, where.outline, np.array([o.centre for o in things]),
-                           np.array([o.radius for o in things])).min())
+    return float(
+        clearance(
+            poses,
+            where.outline,
+            np.array([o.centre for o in things]),
+            np.array([o.radius for o in things]),
+        ).min()
+    )

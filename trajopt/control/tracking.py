@@ -1,12 +1,15 @@
-"""Closed-loop tracking of a trajectory by a differential drive (the first future work of thesis 004).
+"""Closed-loop tracking of a trajectory by a differential drive (the first future work of thesis
+004).
 
-The law is that of Kanayama et al. (1990) in the form whose damping does not depend on speed (de Luca et al.,
-2001): with the error (ex, ey, eyaw) of the reference seen from the robot,
+The law is that of Kanayama et al. (1990) in the form whose damping does not depend on speed (de
+Luca et al., 2001): with the error (ex, ey, eyaw) of the reference seen from the robot,
 
-    v = v_ref cos(eyaw) + k ex,   w = w_ref + c v_ref sinc(eyaw) ey + g eyaw,   g = 2 z sqrt(w_ref^2 + c v_ref^2)
+    v = v_ref cos(eyaw) + k ex,   w = w_ref + c v_ref sinc(eyaw) ey + g eyaw,   g = 2 z sqrt(w_ref^2
+    + c v_ref^2)
 
-and a floor on g, so that the heading is still corrected at the end, where the reference stands. The gain k along
-the path is low and constant: near the friction limit a stiff one locks the wheels when the robot comes late.
+and a floor on g, so that the heading is still corrected at the end, where the reference stands. The
+gain k along the path is low and constant: near the friction limit a stiff one locks the wheels when
+the robot comes late.
 """
 
 from __future__ import annotations
@@ -27,10 +30,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Tracker:
-    """``damping`` z (-), ``stiffness`` c (1/m^2), ``along`` (1/s) and ``floor`` of g (1/s), all chosen.
+    """``damping`` z (-), ``stiffness`` c (1/m^2), ``along`` (1/s) and ``floor`` of g (1/s), all
+    chosen.
 
-    ``wheel_speed`` (m/s) is where commands saturate; both wheels are then scaled, so that the arc is kept.
-    ``settle`` (s) is how long the goal is still corrected after the reference has arrived.
+    ``wheel_speed`` (m/s) is where commands saturate; both wheels are then scaled, so that the arc
+    is kept. ``settle`` (s) is how long the goal is still corrected after the reference has arrived.
     """
 
     damping: float = 0.8
@@ -48,16 +52,19 @@ class Tracker:
             if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
                 raise ArgumentError(f"tracker.{name}", getattr(self, name), "a finite value >= 0")
 
-    def wheel_speeds(self, reference: Array, speed: tuple[float, float], pose: Array,
-                     width: float) -> tuple[float, float]:
-        """Left and right wheel speed (m/s) at ``pose`` (3,) for the ``reference`` pose (3,) that moves at
-        ``speed`` (m/s, rad/s); ``width`` (m) between the wheels."""
+    def wheel_speeds(
+        self, reference: Array, speed: tuple[float, float], pose: Array, width: float
+    ) -> tuple[float, float]:
+        """Left and right wheel speed (m/s) at ``pose`` (3,) for the ``reference`` pose (3,) that
+        moves at ``speed`` (m/s, rad/s); ``width`` (m) between the wheels."""
         dx, dy = reference[0] - pose[0], reference[1] - pose[1]
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         ex, ey = cos * dx + sin * dy, -sin * dx + cos * dy
         turn = float((reference[2] - pose[2] + np.pi) % (2 * np.pi) - np.pi)
         v_ref, w_ref = speed
-        gain = max(2 * self.damping * float(np.sqrt(w_ref**2 + self.stiffness * v_ref**2)), self.floor)
+        gain = max(
+            2 * self.damping * float(np.sqrt(w_ref**2 + self.stiffness * v_ref**2)), self.floor
+        )
         v = v_ref * np.cos(turn) + self.along * ex
         w = w_ref + self.stiffness * v_ref * float(np.sinc(turn / np.pi)) * ey + gain * turn
         left, right = v - w * width / 2, v + w * width / 2
@@ -68,8 +75,9 @@ class Tracker:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What separates the robot from the plan: ``start`` error (m, m, rad, in the body frame) and wheels that
-    turn by ``left`` and ``right`` (relative) more than commanded, with white ``noise`` (relative, each step)."""
+    """What separates the robot from the plan: ``start`` error (m, m, rad, in the body frame) and
+    wheels that turn by ``left`` and ``right`` (relative) more than commanded, with white ``noise``
+    (relative, each step)."""
 
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     left: float = 0.0
@@ -79,7 +87,8 @@ class Disturbance:
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """A tracked run: ``times`` (N,), ``pose`` and ``reference`` (N, 3), wheel speeds ``left``, ``right`` (N,)."""
+    """A tracked run: ``times`` (N,), ``pose`` and ``reference`` (N, 3), wheel speeds ``left``,
+    ``right`` (N,)."""
 
     times: Array
     pose: Array
@@ -91,15 +100,26 @@ class Tracked:
     def errors(self) -> Array:
         """(N, 2): distance (m) and heading (rad) between robot and reference."""
         d = self.pose - self.reference
-        return np.column_stack([np.hypot(d[:, 0], d[:, 1]), np.abs((d[:, 2] + np.pi) % (2 * np.pi) - np.pi)])
+        return np.column_stack(
+            [np.hypot(d[:, 0], d[:, 1]), np.abs((d[:, 2] + np.pi) % (2 * np.pi) - np.pi)]
+        )
 
 
-def track(trajectory: Trajectory, tracker: Tracker | None, robot: Platform, *, sample_time: float,
-          disturbance: Disturbance, rng: Generator) -> Tracked:
-    """Drive a kinematic robot along ``trajectory``: closed loop with a tracker, open loop without (None).
+def track(
+    trajectory: Trajectory,
+    tracker: Tracker | None,
+    robot: Platform,
+    *,
+    sample_time: float,
+    disturbance: Disturbance,
+    rng: Generator,
+) -> Tracked:
+    """Drive a kinematic robot along ``trajectory``: closed loop with a tracker, open loop without
+    (None).
 
-    The tracker knows the true pose every ``sample_time`` (s) and its wheel speeds are held in between. Raises
-    ArgumentError for a sample time that is not positive or a robot that is no differential drive.
+    The tracker knows the true pose every ``sample_time`` (s) and its wheel speeds are held in
+    between. Raises ArgumentError for a sample time that is not positive or a robot that is no
+    differential drive.
     """
     if not (np.isfinite(sample_time) and sample_time > 0):
         raise ArgumentError("sample_time", sample_time, "a finite time > 0 s")
@@ -116,11 +136,17 @@ def track(trajectory: Trajectory, tracker: Tracker | None, robot: Platform, *, s
     poses, sent = [pose.copy()], []
     for k in range(steps):
         v, w = (float(middle.twist[k, 0]), float(middle.twist[k, 2])) if moving[k] else (0.0, 0.0)
-        orders = ((v - w * width / 2, v + w * width / 2) if tracker is None
-                  else tracker.wheel_speeds(state.pose[k], (v, w), pose, width))
+        orders = (
+            (v - w * width / 2, v + w * width / 2)
+            if tracker is None
+            else tracker.wheel_speeds(state.pose[k], (v, w), pose, width)
+        )
         sent.append(orders)
-        real = np.array(orders) * (1 + np.array([disturbance.left, disturbance.right])
-                                   + disturbance.noise * rng.standard_normal(2))
+        real = np.array(orders) * (
+            1
+            + np.array([disturbance.left, disturbance.right])
+            + disturbance.noise * rng.standard_normal(2)
+        )
         pose = _stepped(pose, real, width, sample_time)
         poses.append(pose.copy())
     given = np.array([*sent, (0.0, 0.0)])

@@ -10,18 +10,21 @@ from trajopt.limits.limit import Rows, linear_rows, require_positive
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
 
-_MOVING = 1e-6  # translation per path parameter below which it is a turn on the spot; as in paths/samples
+_MOVING = (
+    1e-6  # translation per path parameter below which it is a turn on the spot; as in paths/samples
+)
 
 
 @dataclass(frozen=True)
 class Acceleration:
-    """Rate of translational speed between -``braking`` and ``forward``, m/s^2 (thesis 004, eqs. 2.7, 2.8).
+    """Rate of translational speed between -``braking`` and ``forward``, m/s^2 (thesis 004, eqs.
+    2.7, 2.8).
 
-    The speed is v = p s' with p = |(twist_x, twist_y)|, so v' = p s'' + (d . acceleration_rate) s'^2 with
-    d the direction of travel in the body frame: exactly linear, and equal to s'' where the robot drives along
-    its heading. Centripetal acceleration does not count (that is what ``Slip`` is for), and a turn on the
-    spot is not bounded (that is what ``WheelAcceleration`` is for).
-    Raises ArgumentError unless both are > 0.
+    The speed is v = p s' with p = |(twist_x, twist_y)|, so v' = p s'' + (d . acceleration_rate)
+    s'^2 with d the direction of travel in the body frame: exactly linear, and equal to s'' where
+    the robot drives along its heading. Centripetal acceleration does not count (that is what
+    ``Slip`` is for), and a turn on the spot is not bounded (that is what ``WheelAcceleration`` is
+    for). Raises ArgumentError unless both are > 0.
     """
 
     forward: float  # m/s^2
@@ -40,4 +43,6 @@ class Acceleration:
         a = np.where(moving, p, 0.0)
         b = np.sum(direction * path.acceleration_rate[:, :2], axis=1)
         limits = np.tile([self.forward, self.braking], (len(p), 1))
-        return linear_rows(self.name, np.column_stack([a, -a]), np.column_stack([b, -b]), limits, limits)
+        return linear_rows(
+            self.name, np.column_stack([a, -a]), np.column_stack([b, -b]), limits, limits
+        )

@@ -20,8 +20,9 @@ class Rows:
     """Rows a s'' + b s'^2 <= c at N gridpoints, R rows each, and an upper bound on s'^2.
 
     ``scale`` (N, R) is positive and has the unit of ``c``: the size of the limit itself (a wheel
-    acceleration limit, mu g, ...). Margins are reported relative to it. ``edges`` are path parameters (m)
-    where the limit jumps or bends (ends of a speed zone): time scaling puts gridpoints there.
+    acceleration limit, mu g, ...). Margins are reported relative to it. ``edges`` are path
+    parameters (m) where the limit jumps or bends (ends of a speed zone): time scaling puts
+    gridpoints there.
     """
 
     name: str  # the limit's name, as reported when it binds or cannot be met
@@ -40,14 +41,21 @@ class Limit(Protocol):
     def name(self) -> str: ...
 
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
-        """Rows at the gridpoints of ``path``. Raises ArgumentError where the limit needs a robot."""
+        """Rows at the gridpoints of ``path``. Raises ArgumentError where the limit needs a
+        robot."""
         ...
 
 
 def linear_rows(name: str, a: Array, b: Array, c: Array, scale: Array | float) -> Rows:
     """Rows a s'' + b s'^2 <= c, arrays (N, R), without a bound on the speed alone."""
-    return Rows(name, a, b, c, np.broadcast_to(np.asarray(scale, dtype=np.float64), a.shape),
-                np.full(len(a), np.inf))
+    return Rows(
+        name,
+        a,
+        b,
+        c,
+        np.broadcast_to(np.asarray(scale, dtype=np.float64), a.shape),
+        np.full(len(a), np.inf),
+    )
 
 
 def speed_rows(name: str, rate: Array, largest: float) -> Rows:
@@ -67,5 +75,7 @@ def require_positive(argument: str, value: float, unit: str) -> None:
 def require_robot(name: str, robot: Platform | None) -> Platform:
     """The robot, or ArgumentError: the limit ``name`` cannot be told without one."""
     if robot is None:
-        raise ArgumentError("robot", None, f"a robot: the limit '{name}' depends on its wheels or masses")
+        raise ArgumentError(
+            "robot", None, f"a robot: the limit '{name}' depends on its wheels or masses"
+        )
     return robot

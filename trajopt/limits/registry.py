@@ -15,14 +15,16 @@ from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 
-LIMITS: Mapping[str, Callable[..., Limit]] = MappingProxyType({
-    "acceleration": Acceleration,
-    "slip": Slip,
-    "speed": Speed,
-    "speed_profile": SpeedProfile,
-    "speed_zones": SpeedZones,
-    "tip": Tip,
-    "wheel_acceleration": WheelAcceleration,
-    "wheel_speed": WheelSpeed,
-    "yaw_rate": YawRate,
-})
+LIMITS: Mapping[str, Callable[..., Limit]] = MappingProxyType(
+    {
+        "acceleration": Acceleration,
+        "slip": Slip,
+        "speed": Speed,
+        "speed_profile": SpeedProfile,
+        "speed_zones": SpeedZones,
+        "tip": Tip,
+        "wheel_acceleration": WheelAcceleration,
+        "wheel_speed": WheelSpeed,
+        "yaw_rate": YawRate,
+    }
+)

@@ -18,19 +18,21 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Slip:
-    """Friction coefficient ``friction`` between wheels and ground, with load transfer, slope and curvature.
+    """Friction coefficient ``friction`` between wheels and ground, with load transfer, slope and
+    curvature.
 
-    Robots whose driven wheels all have plain tyres: ||(f_x, f_y)|| <= friction times the load on the driven
-    wheels, as the inscribed polygon of ``sides`` sides (SOURCES 004; 16 sides cost 0.07 % of the time). The
-    tyres share the force as their loads allow, and the yaw moment is not counted. With ``per_wheel`` each
-    tyre gets its own polygon: forces are the least-norm ones with the right sum and yaw moment. This is
-    stricter, as two wheels on one axle also have to hold the body on its curve.
+    Robots whose driven wheels all have plain tyres: ||(f_x, f_y)|| <= friction times the load on
+    the driven wheels, as the inscribed polygon of ``sides`` sides (SOURCES 004; 16 sides cost 0.07
+    % of the time). The tyres share the force as their loads allow, and the yaw moment is not
+    counted. With ``per_wheel`` each tyre gets its own polygon: forces are the least-norm ones with
+    the right sum and yaw moment. This is stricter, as two wheels on one axle also have to hold the
+    body on its curve.
 
-    Swedish wheels pass force only along the axis of the ground roller: |f_i| <= friction N_i with the
-    least-norm wheel forces f_i. Two rows a wheel, no polygon needed.
+    Swedish wheels pass force only along the axis of the ground roller: |f_i| <= friction N_i with
+    the least-norm wheel forces f_i. Two rows a wheel, no polygon needed.
 
-    Raises ArgumentError for a friction that is not > 0, fewer than 4 sides, a robot whose wheels cannot
-    supply the wrench, or no robot.
+    Raises ArgumentError for a friction that is not > 0, fewer than 4 sides, a robot whose wheels
+    cannot supply the wrench, or no robot.
     """
 
     friction: float  # dimensionless
@@ -41,13 +43,17 @@ class Slip:
     def __post_init__(self) -> None:
         require_positive(f"{self.name}.friction", self.friction, "(friction coefficient)")
         if self.sides < 4:
-            raise ArgumentError(f"{self.name}.sides", self.sides, "4 or more sides of the friction polygon")
+            raise ArgumentError(
+                f"{self.name}.sides", self.sides, "4 or more sides of the friction polygon"
+            )
 
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
         body = require_robot(self.name, robot).body
         driven = np.asarray(body.driven, dtype=bool)
         if not driven.any():
-            raise ArgumentError("robot.body.driven", body.driven, "at least one contact that passes traction")
+            raise ArgumentError(
+                "robot.body.driven", body.driven, "at least one contact that passes traction"
+            )
         plain = np.isnan(np.asarray(body.roller_axis, dtype=np.float64))
         loads = contact_loads(path, body)
         if not self.per_wheel and plain[driven].all():
@@ -60,7 +66,9 @@ class Slip:
             width = 2 if plain[i] else 1
             force = _columns(forces, slice(column, column + width))
             load = _columns(loads, slice(i, i + 1))
-            blocks.append(self._polygon(force, load) if plain[i] else self._along_roller(force, load))
+            blocks.append(
+                self._polygon(force, load) if plain[i] else self._along_roller(force, load)
+            )
             column += width
         return self._collect(blocks, 1.0 / len(body.contacts))
 
@@ -78,8 +86,13 @@ class Slip:
         return Affine(f.a - mu * load.a, f.b - mu * load.b, f.c - mu * load.c)
 
     def _collect(self, blocks: list[Affine], share: float) -> Rows:
-        return linear_rows(self.name, np.hstack([k.a for k in blocks]), np.hstack([k.b for k in blocks]),
-                           -np.hstack([k.c for k in blocks]), share * self.friction * STANDARD_GRAVITY)
+        return linear_rows(
+            self.name,
+            np.hstack([k.a for k in blocks]),
+            np.hstack([k.b for k in blocks]),
+            -np.hstack([k.c for k in blocks]),
+            share * self.friction * STANDARD_GRAVITY,
+        )
 
 
 def _columns(value: Affine, which: slice) -> Affine:
@@ -87,7 +100,8 @@ def _columns(value: Affine, which: slice) -> Affine:
 
 
 def _distribution(body: Body, driven: NDArray[np.bool_], plain: NDArray[np.bool_]) -> Array:
-    """(F, 3): least-norm contact forces from the wrench; one column of force a roller, two a plain tyre."""
+    """(F, 3): least-norm contact forces from the wrench; one column of force a roller, two a plain
+    tyre."""
     arms, columns = contact_arms(body), []
     for i in np.flatnonzero(driven):
         angles = [0.0, np.pi / 2] if plain[i] else [body.roller_axis[i]]
@@ -96,5 +110,7 @@ def _distribution(body: Body, driven: NDArray[np.bool_], plain: NDArray[np.bool_
             columns.append([ex, ey, arms[i, 0] * ey - arms[i, 1] * ex])
     wrench: Array = np.array(columns, dtype=np.float64).T
     if np.linalg.matrix_rank(wrench, tol=1e-9) < 3:
-        raise ArgumentError("robot.body", body.contacts, "driven contacts that can push along x, y and turn")
+        raise ArgumentError(
+            "robot.body", body.contacts, "driven contacts that can push along x, y and turn"
+        )
     return np.asarray(np.linalg.pinv(wrench), dtype=np.float64)

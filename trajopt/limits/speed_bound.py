@@ -19,10 +19,11 @@ _TOUCH = 1e-9  # m; a zone reaches this far beyond its ends, so that the gridpoi
 
 @dataclass(frozen=True)
 class SpeedZones:
-    """Path speed s' <= speed inside zones: ``zones`` holds (from, to, speed) in m, m, m/s; they may overlap.
+    """Path speed s' <= speed inside zones: ``zones`` holds (from, to, speed) in m, m, m/s; they may
+    overlap.
 
-    Raises ArgumentError for an empty zone, a negative speed or a number that is not finite. A speed of 0 is
-    a stop that no motion passes: time scaling says so.
+    Raises ArgumentError for an empty zone, a negative speed or a number that is not finite. A speed
+    of 0 is a stop that no motion passes: time scaling says so.
     """
 
     zones: tuple[tuple[float, float, float], ...]
@@ -31,8 +32,9 @@ class SpeedZones:
     def __post_init__(self) -> None:
         for i, zone in enumerate(self.zones):
             if len(zone) != 3 or not np.all(np.isfinite(zone)) or zone[1] <= zone[0] or zone[2] < 0:
-                raise ArgumentError(f"{self.name}.zones[{i}]", zone,
-                                    "(from, to > from, speed >= 0), m and m/s")
+                raise ArgumentError(
+                    f"{self.name}.zones[{i}]", zone, "(from, to > from, speed >= 0), m and m/s"
+                )
 
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
         bound = np.full(len(path.s), np.inf)
@@ -45,7 +47,8 @@ class SpeedZones:
 
 @dataclass(frozen=True)
 class SpeedProfile:
-    """Path speed s' <= a profile: linear in s between ``places`` (m) with ``speeds`` (m/s), constant beyond.
+    """Path speed s' <= a profile: linear in s between ``places`` (m) with ``speeds`` (m/s),
+    constant beyond.
 
     Raises ArgumentError unless places increase and speeds are finite and >= 0.
     """
@@ -55,14 +58,20 @@ class SpeedProfile:
     name: str = "speed_profile"
 
     def __post_init__(self) -> None:
-        if not self.places or not np.all(np.isfinite(self.places)) or np.any(np.diff(self.places) <= 0):
+        if (
+            not self.places
+            or not np.all(np.isfinite(self.places))
+            or np.any(np.diff(self.places) <= 0)
+        ):
             raise ArgumentError(f"{self.name}.places", self.places, "increasing path parameters, m")
         speeds = np.asarray(self.speeds, dtype=np.float64)
         if len(speeds) != len(self.places) or not np.all(np.isfinite(speeds)) or np.any(speeds < 0):
             raise ArgumentError(f"{self.name}.speeds", self.speeds, "one speed >= 0 m/s a place")
 
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
-        return _bound(self.name, np.interp(path.s, self.places, self.speeds) ** 2, tuple(self.places))
+        return _bound(
+            self.name, np.interp(path.s, self.places, self.speeds) ** 2, tuple(self.places)
+        )
 
 
 def _bound(name: str, sd2_max: Array, edges: tuple[float, ...]) -> Rows:

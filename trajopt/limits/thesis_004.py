@@ -1,9 +1,9 @@
 """Limits as thesis 004 writes them, so that its tables can be reproduced and its errors shown.
 
-Wrong in them, and kept (SOURCES 004): braking slip is taken as minus the accelerating one (eq. 2.21), though
-braking loads the front drive axle: too strict on the flat, unsafe downhill; the tipping bound of eq. 2.24 is
-a braking bound, but is used in both directions; the sliding speed counts the whole weight and the sharpest
-bend of the whole path (eq. 2.15).
+Wrong in them, and kept (SOURCES 004): braking slip is taken as minus the accelerating one (eq.
+2.21), though braking loads the front drive axle: too strict on the flat, unsafe downhill; the
+tipping bound of eq. 2.24 is a braking bound, but is used in both directions; the sliding speed
+counts the whole weight and the sharpest bend of the whole path (eq. 2.15).
 """
 
 from __future__ import annotations
@@ -28,18 +28,23 @@ TIP_SINE = 1.63  # dimensionless (eq. 2.24): 0.215 / 0.132
 
 
 def thesis_slip_acceleration(slope: Array, friction: float) -> Array:
-    """Largest acceleration before the wheels slip, m/s^2, at slopes (N,), rad, uphill > 0 (eq. 2.20)."""
+    """Largest acceleration before the wheels slip, m/s^2, at slopes (N,), rad, uphill > 0 (eq.
+    2.20)."""
     cos, sin = np.cos(slope), np.sin(slope)
-    return np.asarray(SLIP_COSINE * cos - GRAVITY * sin - SLIP_FRICTION * cos / (SLIP_OFFSET + friction))
+    return np.asarray(
+        SLIP_COSINE * cos - GRAVITY * sin - SLIP_FRICTION * cos / (SLIP_OFFSET + friction)
+    )
 
 
 def thesis_tip_acceleration(slope: Array) -> Array:
-    """Largest acceleration before the robot tips, m/s^2, at slopes (N,), rad, uphill > 0 (eq. 2.24)."""
+    """Largest acceleration before the robot tips, m/s^2, at slopes (N,), rad, uphill > 0 (eq.
+    2.24)."""
     return np.asarray(TIP_LEVER * GRAVITY * (np.cos(slope) - TIP_SINE * np.sin(slope)))
 
 
 def thesis_slide_speed(curvature: Array, friction: float) -> float:
-    """Speed at which the sharpest bend of a path slides out, m/s (eq. 2.15); inf on a straight path."""
+    """Speed at which the sharpest bend of a path slides out, m/s (eq. 2.15); inf on a straight
+    path."""
     sharpest = float(np.max(np.abs(curvature), initial=0.0))
     return float(np.sqrt(friction * GRAVITY / sharpest)) if sharpest > 0 else float("inf")
 

@@ -18,12 +18,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Tip:
-    """No tipping fore, aft or sideways; ``reserve`` (m) keeps the zero-moment point that far inside.
+    """No tipping fore, aft or sideways; ``reserve`` (m) keeps the zero-moment point that far
+    inside.
 
-    The load on the far side of every edge of the support polygon (the convex hull of the contacts) stays
-    >= 0: -h n . (f_x, f_y) <= d f_z, with n the outward normal of the edge and d its distance from the
-    foot of the centre of gravity. For two axles these are N_A >= 0, N_B >= 0 and h |f_y| <= w f_z
-    (SOURCES 004). One row an edge; contact with the ground (f_z >= 0) follows from them.
+    The load on the far side of every edge of the support polygon (the convex hull of the contacts)
+    stays >= 0: -h n . (f_x, f_y) <= d f_z, with n the outward normal of the edge and d its distance
+    from the foot of the centre of gravity. For two axles these are N_A >= 0, N_B >= 0 and h |f_y|
+    <= w f_z (SOURCES 004). One row an edge; contact with the ground (f_z >= 0) follows from them.
     Raises ArgumentError for a reserve < 0, a centre of gravity outside the support, or no robot.
     """
 
@@ -39,21 +40,29 @@ class Tip:
         normals, distances = support_edges(body)
         distances = distances - self.reserve
         if np.any(distances <= 0):
-            raise ArgumentError(f"{self.name}: robot.body.cog", body.cog,
-                                f"a centre of gravity more than {self.reserve} m inside the support polygon")
-        lever = np.column_stack([-normals * (body.cog[2] / distances)[:, None], -np.ones(len(normals))])
+            raise ArgumentError(
+                f"{self.name}: robot.body.cog",
+                body.cog,
+                f"a centre of gravity more than {self.reserve} m inside the support polygon",
+            )
+        lever = np.column_stack(
+            [-normals * (body.cog[2] / distances)[:, None], -np.ones(len(normals))]
+        )
         value = specific_force(path, body).through(lever)
         return linear_rows(self.name, value.a, value.b, -value.c, STANDARD_GRAVITY)
 
 
 def support_edges(body: Body) -> tuple[Array, Array]:
-    """Outward normals (E, 2) of the support polygon's edges, and distances (E,) of the cog's foot from them.
+    """Outward normals (E, 2) of the support polygon's edges, and distances (E,) of the cog's foot
+    from them.
 
     Raises ArgumentError when the contacts lie on one line.
     """
     hull = _convex_hull(contact_arms(body))
     if len(hull) < 3:
-        raise ArgumentError("robot.body.contacts", body.contacts, "three or more contacts not on one line")
+        raise ArgumentError(
+            "robot.body.contacts", body.contacts, "three or more contacts not on one line"
+        )
     edge = np.roll(hull, -1, axis=0) - hull
     normals = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.hypot(edge[:, 0], edge[:, 1])[:, None]
     return normals, np.sum(normals * hull, axis=1)

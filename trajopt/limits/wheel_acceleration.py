@@ -15,9 +15,9 @@ from trajopt.robots.platform import Platform
 class WheelAcceleration:
     """|angular acceleration| <= ``largest``, rad/s^2, on every driven wheel.
 
-    Wheel rates are inverse @ twist s', so their derivative is inverse @ (twist s'' + twist_rate s'^2): for
-    two fixed wheels at +-b, |(1 +- b kappa) s'' +- b kappa' s'^2| <= r largest. Two rows a wheel.
-    Raises ArgumentError unless ``largest`` > 0, or when there is no robot.
+    Wheel rates are inverse @ twist s', so their derivative is inverse @ (twist s'' + twist_rate
+    s'^2): for two fixed wheels at +-b, |(1 +- b kappa) s'' +- b kappa' s'^2| <= r largest. Two rows
+    a wheel. Raises ArgumentError unless ``largest`` > 0, or when there is no robot.
     """
 
     largest: float  # rad/s^2

@@ -1,4 +1,5 @@
-"""A limit that gives way to a robot which is already too fast for it: below the speed of a braking motion it holds."""
+"""A limit that gives way to a robot which is already too fast for it: below the speed of a braking
+motion it holds."""
 
 from __future__ import annotations
 
@@ -13,8 +14,9 @@ from trajopt.robots.platform import Platform
 
 @dataclass(frozen=True)
 class Yielding:
-    """``limit``, whose bound on the speed alone is raised to a braking motion: ``squares`` s'^2 (m^2/s^2) at
-    ``places`` (m), linear in between. Its rows on s'' stay as they are. ``edges`` (m): where the bound is reached.
+    """``limit``, whose bound on the speed alone is raised to a braking motion: ``squares`` s'^2
+    (m^2/s^2) at ``places`` (m), linear in between. Its rows on s'' stay as they are. ``edges`` (m):
+    where the bound is reached.
 
     Made by time scaling for a robot that is faster than a bound and can only brake.
     """
@@ -31,4 +33,6 @@ class Yielding:
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
         rows = self.limit.rows(path, robot)
         braking = np.interp(path.s, self.places, self.squares)
-        return replace(rows, sd2_max=np.maximum(rows.sd2_max, braking), edges=(*rows.edges, *self.edges))
+        return replace(
+            rows, sd2_max=np.maximum(rows.sd2_max, braking), edges=(*rows.edges, *self.edges)
+        )

@@ -1,13 +1,15 @@
 """Design of a robot on split offset casters as an objective (thesis 001, sections 3.2 and 3.3).
 
-Decision variables, m: offset, split, gap, width, with gap = wheel radius - offset. The gap replaces the
-radius so that the condition "offset below the radius" is a bound: eq. 8's root never sees a negative number.
-Five terms are to be large: isotropy K, pivot angle beta_max (rad), obstacle height h (m; the wheel radius,
-since h is linear in it), range d_max (m) and stability S (m). J is their sum, each over its largest value in
-the design space (eq. 9); the cost is -J. Constraints: workspace circles (eq. 5) and battery mass >= 0.
+Decision variables, m: offset, split, gap, width, with gap = wheel radius - offset. The gap replaces
+the radius so that the condition "offset below the radius" is a bound: eq. 8's root never sees a
+negative number. Five terms are to be large: isotropy K, pivot angle beta_max (rad), obstacle height
+h (m; the wheel radius, since h is linear in it), range d_max (m) and stability S (m). J is their
+sum, each over its largest value in the design space (eq. 9); the cost is -J. Constraints: workspace
+circles (eq. 5) and battery mass >= 0.
 
-PHYSICAL is the default: cylinder mass with pi, Bekker's resistance with the wheel diameter, and the true
-inner distance of the support polygon. THESIS is the thesis's reading that gives its printed numbers.
+PHYSICAL is the default: cylinder mass with pi, Bekker's resistance with the wheel diameter, and the
+true inner distance of the support polygon. THESIS is the thesis's reading that gives its printed
+numbers.
 """
 
 from __future__ import annotations
@@ -36,13 +38,20 @@ MODULE_SHARE = 0.05  # of the total mass, one module without wheels (section 3.2
 RUBBER = 920.0  # kg/m^3, wheels (section 3.2)
 BATTERY_ENERGY = 576e3  # J/kg, lithium-ion (section 3.2)
 LARGEST_TILT = float(np.radians(30.0))  # rad, terrain angles 0-30 deg of Table V
-LEAST_GAP = 0.004  # m, wheel radius - offset; below, eq. 8's root becomes singular (Table V keeps 4-5 mm)
+LEAST_GAP = (
+    0.004  # m, wheel radius - offset; below, eq. 8's root becomes singular (Table V keeps 4-5 mm)
+)
 THESIS_SPACING = 1.0  # m between module axes in the thesis's stability (inferred: Table VI's S fits 0.577 - offset)
 LEVELS = 31  # of the full factorial: 31^4 = 923,521 designs
 TERMS = ("K", "beta_max", "h", "d_max", "S")
 VARIABLES = ("offset", "split", "gap", "width")
 # m; chosen: hold Table V, the baseline of Table VI and the point design with room around
-BOUNDS: tuple[tuple[float, float], ...] = ((0.05, 0.20), (0.10, 0.50), (LEAST_GAP, 0.12), (0.01, 0.25))
+BOUNDS: tuple[tuple[float, float], ...] = (
+    (0.05, 0.20),
+    (0.10, 0.50),
+    (LEAST_GAP, 0.12),
+    (0.01, 0.25),
+)
 
 
 class Model(Enum):
@@ -63,7 +72,9 @@ class AsocDesign:
 
     def __post_init__(self) -> None:
         if self.modules < 3:
-            raise ArgumentError("modules", self.modules, "at least 3 modules: fewer have no support polygon")
+            raise ArgumentError(
+                "modules", self.modules, "at least 3 modules: fewer have no support polygon"
+            )
         if not 0 <= self.tilt < np.pi / 2:
             raise ArgumentError("tilt", self.tilt, "a terrain angle in [0, 90) deg, rad")
 
@@ -96,8 +107,11 @@ class AsocDesign:
         radius = offset + gap
         pivot = np.arctan(0.5 * split / np.sqrt(gap * (gap + 2 * offset)))  # eq. 8
         load = TOTAL_MASS * STANDARD_GRAVITY / (2 * self.modules)
-        resistance = 2 * self.modules * self.soil.compaction(
-            load, width, radius, diameter_term=self.model is Model.PHYSICAL)
+        resistance = (
+            2
+            * self.modules
+            * self.soil.compaction(load, width, radius, diameter_term=self.model is Model.PHYSICAL)
+        )
         distance = self.battery_mass(radius, width) * BATTERY_ENERGY / resistance  # eq. 11
         return self.curve.at(split / offset), pivot, radius, distance, self.stability(offset)
 
@@ -110,16 +124,16 @@ class AsocDesign:
     def stability(self, offset: Any) -> Any:
         """Least distance (m) from the centre to the support polygon over all module angles.
 
-        Two neighbours that both trail inwards move their edge in by the offset. The thesis's column S fits
-        the corner distance 1/(2 sin(pi/N)) - offset with axes 1 m apart instead (inferred).
+        Two neighbours that both trail inwards move their edge in by the offset. The thesis's column
+        S fits the corner distance 1/(2 sin(pi/N)) - offset with axes 1 m apart instead (inferred).
         """
         if self.model is Model.THESIS:
             return THESIS_SPACING / (2 * np.sin(np.pi / self.modules)) - offset
         return BODY_LENGTH / 2 * np.cos(np.pi / self.modules) - offset
 
     def slack(self, offset: Any, split: Any, gap: Any, width: Any) -> tuple[Any, Any]:
-        """Constraints, >= 0 where kept: half the room between workspace circles (eq. 5), m; the battery's
-        share of the total mass."""
+        """Constraints, >= 0 where kept: half the room between workspace circles (eq. 5), m; the
+        battery's share of the total mass."""
         room = self.axis_distance / 2 - envelope(offset, split, offset + gap, width)
         return room, self.battery_mass(offset + gap, width) / TOTAL_MASS
 
@@ -130,12 +144,18 @@ class AsocDesign:
 
     @cached_property
     def peaks(self) -> Mapping[str, float]:
-        """Largest value of each term over the feasible designs of the 31-level factorial (eq. 9's stars)."""
+        """Largest value of each term over the feasible designs of the 31-level factorial (eq. 9's
+        stars)."""
         columns = grid(self.bounds, LEVELS)
         feasible = np.minimum(*self.slack(*columns)) >= 0
-        return MappingProxyType({
-            name: float(np.max(np.where(feasible, np.broadcast_to(term, feasible.shape), -np.inf)))
-            for name, term in zip(TERMS, self.terms(*columns), strict=True)})
+        return MappingProxyType(
+            {
+                name: float(
+                    np.max(np.where(feasible, np.broadcast_to(term, feasible.shape), -np.inf))
+                )
+                for name, term in zip(TERMS, self.terms(*columns), strict=True)
+            }
+        )
 
     def total(self, offset: Any, split: Any, gap: Any, width: Any) -> Any:
         """J of eq. 9."""
@@ -145,8 +165,9 @@ class AsocDesign:
     def evaluate(self, candidates: Array) -> Evaluation:
         """Cost -J and violation of candidates (n, 4).
 
-        Formulas end at the edge of the design space (no lengths below 0 there), so candidates outside are
-        judged at the nearest design inside; the optimizers' runs add the distance to the violation.
+        Formulas end at the edge of the design space (no lengths below 0 there), so candidates
+        outside are judged at the nearest design inside; the optimizers' runs add the distance to
+        the violation.
         """
         low, high = self.bounds.T
         columns = tuple(np.clip(np.asarray(candidates, dtype=np.float64), low, high).T)
@@ -155,7 +176,8 @@ class AsocDesign:
         return Evaluation(-np.asarray(self.total(*columns)), violation)
 
     def term_values(self, candidates: Array) -> tuple[Array, Array]:
-        """Terms (n, 5), in the order of TERMS, and violations (n,) of candidates (n, 4): for Pareto fronts."""
+        """Terms (n, 5), in the order of TERMS, and violations (n,) of candidates (n, 4): for Pareto
+        fronts."""
         low, high = self.bounds.T
         columns = tuple(np.clip(np.asarray(candidates, dtype=np.float64), low, high).T)
         return np.column_stack(self.terms(*columns)), self.evaluate(candidates).violation
@@ -187,14 +209,16 @@ class AsocDesign:
 def grid(bounds: Array, levels: int) -> tuple[Array, ...]:
     """Component arrays of a full factorial, shaped to broadcast against each other (open grid)."""
     axes = [np.linspace(low, high, levels) for low, high in bounds]
-    return tuple(axis.reshape([-1 if k == i else 1 for k in range(len(axes))]) for i, axis in enumerate(axes))
+    return tuple(
+        axis.reshape([-1 if k == i else 1 for k in range(len(axes))]) for i, axis in enumerate(axes)
+    )
 
 
 def full_factorial(design: AsocDesign, levels: int = LEVELS) -> tuple[Array, float]:
     """The best feasible design (4,) and its J among levels^4 on the design's bounds (section 3.2).
 
-    The open grid lets each formula run only over the variables it has. Raises ArgumentError for fewer than
-    2 levels or when no design is feasible.
+    The open grid lets each formula run only over the variables it has. Raises ArgumentError for
+    fewer than 2 levels or when no design is feasible.
     """
     if levels < 2:
         raise ArgumentError("levels", levels, "at least 2 levels a variable")
@@ -202,12 +226,17 @@ def full_factorial(design: AsocDesign, levels: int = LEVELS) -> tuple[Array, flo
     value = np.where(np.minimum(*design.slack(*columns)) >= 0, design.total(*columns), -np.inf)
     best = np.unravel_index(int(np.argmax(value)), value.shape)
     if not np.isfinite(value[best]):
-        raise ArgumentError("levels", levels, "a grid that holds a feasible design; take more levels")
-    return np.array([column.ravel()[i] for column, i in zip(columns, best, strict=True)]), float(value[best])
+        raise ArgumentError(
+            "levels", levels, "a grid that holds a feasible design; take more levels"
+        )
+    return np.array([column.ravel()[i] for column, i in zip(columns, best, strict=True)]), float(
+        value[best]
+    )
 
 
 def best_width(design: AsocDesign, offset: float, split: float, radius: float) -> float:
-    """Width (m) of the widest range at given other sizes: only d_max depends on it. Resolution 0.01 mm."""
+    """Width (m) of the widest range at given other sizes: only d_max depends on it. Resolution 0.01
+    mm."""
     low, high = BOUNDS[3]
     widths = np.arange(low, high, 1e-5)
     distance = design.terms(offset, split, radius - offset, widths)[3]

@@ -32,7 +32,8 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class SymbolicProblem:
-    """min cost subject to lower <= constraints <= upper, as symbolic expressions (None: no constraints)."""
+    """min cost subject to lower <= constraints <= upper, as symbolic expressions (None: no
+    constraints)."""
 
     cost: Any
     constraints: Any
@@ -61,7 +62,8 @@ class Objective(Protocol):
         ...
 
     def score(self, candidate: Array) -> Evaluation:
-        """Cost and violation of one candidate (d,), recomputed more finely than any search sees it."""
+        """Cost and violation of one candidate (d,), recomputed more finely than any search sees
+        it."""
         ...
 
 
@@ -103,7 +105,8 @@ class LatticeObjective(ResidualObjective, Protocol):
 
 @dataclass(frozen=True)
 class AffinePart:
-    """Critical residuals = matrix @ z[variables] + offset - period * turns, actuators ideal, the rest at rest.
+    """Critical residuals = matrix @ z[variables] + offset - period * turns, actuators ideal, the
+    rest at rest.
 
     ``base`` (d,) holds the values of the variables that are not in ``variables``.
     """

@@ -1,8 +1,10 @@
-"""Keeping a robot's footprint inside a space and out of a step, along the whole path, as a violation.
+"""Keeping a robot's footprint inside a space and out of a step, along the whole path, as a
+violation.
 
-Space (a rectangle) and the free side of the step (a half-plane) are convex, so a footprint lies inside them
-exactly when its corners do. The violation is the depth (m) of the worst corner at the worst place; searches see it
-on a coarse grid with a small reserve, ``score`` recomputes it without one on a grid ten times finer.
+Space (a rectangle) and the free side of the step (a half-plane) are convex, so a footprint lies
+inside them exactly when its corners do. The violation is the depth (m) of the worst corner at the
+worst place; searches see it on a coarse grid with a small reserve, ``score`` recomputes it without
+one on a grid ten times finer.
 """
 
 from __future__ import annotations
@@ -23,12 +25,15 @@ from trajopt.world.free_ground import FreeGround, path_margin
 Array = NDArray[np.float64]
 
 SEARCH_STEPS = 36  # steps along the path in a search, chosen: 6 cm on a 2 m path
-RESERVE = 0.002  # m, chosen: more than a corner strays between two search steps (its sagitta, about 1 mm)
+RESERVE = (
+    0.002  # m, chosen: more than a corner strays between two search steps (its sagitta, about 1 mm)
+)
 
 
 @dataclass(frozen=True)
 class ClearObjective:
-    """A terminal objective whose violation says how far the footprint leaves its free ground (m)."""
+    """A terminal objective whose violation says how far the footprint leaves its free ground
+    (m)."""
 
     terminal: TerminalObjective
     ground: FreeGround
@@ -59,14 +64,17 @@ class ClearObjective:
         return self.terminal.path(candidate)
 
     def margins(self, candidates: Array) -> Array:
-        """(n,): least distance (m) from any border along the path of each candidate (n, d), search grid."""
+        """(n,): least distance (m) from any border along the path of each candidate (n, d), search
+        grid."""
         points = self.terminal.control_points(np.asarray(candidates, dtype=np.float64).T)
         poses = (self._values @ points.x, self._values @ points.y, self._values @ points.yaw)
         return np.asarray(self.ground.margin(*poses).min(axis=0))
 
     def evaluate(self, candidates: Array) -> Evaluation:
         inner = self.terminal.evaluate(candidates)
-        return Evaluation(inner.cost, inner.violation + np.maximum(RESERVE - self.margins(candidates), 0.0))
+        return Evaluation(
+            inner.cost, inner.violation + np.maximum(RESERVE - self.margins(candidates), 0.0)
+        )
 
     def score(self, candidate: Array) -> Evaluation:
         inner = self.terminal.score(candidate)
@@ -77,7 +85,8 @@ class ClearObjective:
         """Named cost terms of one candidate (d,)."""
         return self.terminal.terms(candidate)
 
-    # -- what the lattice, Newton and IPOPT ask for: the terminal objective's own ------------------------
+    # -- what the lattice, Newton and IPOPT ask for: the terminal objective's own
+    # ------------------------
 
     def residuals(self, z: Any, turns: Any, *, exact: bool = False) -> list[Any]:
         return self.terminal.residuals(z, turns, exact=exact)
@@ -95,20 +104,27 @@ class ClearObjective:
         return self.terminal.affine_part()
 
     def effort(self, candidates: Array) -> Array:
-        """(n,): peak wheel rate; candidates that leave the free ground come after all that stay inside."""
+        """(n,): peak wheel rate; candidates that leave the free ground come after all that stay
+        inside."""
         effort = self.terminal.effort(candidates)
         outside = np.maximum(RESERVE - self.margins(candidates), 0.0)
         return np.where(outside > 0, effort.max(initial=0.0) + 1.0 + outside, effort)
 
     def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:
-        """The terminal program with one row more for every corner, border and search step: room >= reserve."""
+        """The terminal program with one row more for every corner, border and search step: room >=
+        reserve."""
         inner = self.terminal.symbolic(z, parameters)
         points = self.terminal.control_points(z[: self.dimension])
-        rooms = self.ground.rooms(self._values @ points.x, self._values @ points.y, self._values @ points.yaw)
+        rooms = self.ground.rooms(
+            self._values @ points.x, self._values @ points.y, self._values @ points.yaw
+        )
         count = len(rooms) * (self.steps + 1)
-        return SymbolicProblem(inner.cost, np.vstack([inner.constraints, *rooms]),
-                               np.concatenate([inner.lower, np.full(count, RESERVE)]),
-                               np.concatenate([inner.upper, np.full(count, np.inf)]))
+        return SymbolicProblem(
+            inner.cost,
+            np.vstack([inner.constraints, *rooms]),
+            np.concatenate([inner.lower, np.full(count, RESERVE)]),
+            np.concatenate([inner.upper, np.full(count, np.inf)]),
+        )
 
     def parameters_at(self, start: Array) -> Array:
         return self.terminal.parameters_at(start)

@@ -1,9 +1,9 @@
 """The prediction of ``rollout`` as a numba kernel, for swarms and Newton steps.
 
-The formulas are those of ``trajopt.objectives.rollout``; a test holds the two together to 1e-12. Steps run
-outside and candidates inside, so that the inner loop has no branches and no trigonometry: every rotation is
-the previous one turned by a small increment, with a polynomial that is exact to rounding for increments up
-to 0.2 rad (`MAX_INCREMENT`).
+The formulas are those of ``trajopt.objectives.rollout``; a test holds the two together to 1e-12.
+Steps run outside and candidates inside, so that the inner loop has no branches and no trigonometry:
+every rotation is the previous one turned by a small increment, with a polynomial that is exact to
+rounding for increments up to 0.2 rad (`MAX_INCREMENT`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ Array = NDArray[np.float64]
 
 S3, S5, S7, S9 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880  # Taylor coefficients of the sine
 C2, C4, C6, C8, C10 = -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800  # and of the cosine
-# Fast-math without reassociation, which would cancel (m + h) - (m - h) to 2 h and lose the digits of short spans.
+# Fast-math without reassociation, which would cancel (m + h) - (m - h) to 2 h and lose the digits
+# of short spans.
 STRICT = {"nsz", "contract"}
 MAX_INCREMENT = 0.2  # rad; the first dropped term of the series is below 1e-17 there
 
@@ -49,8 +50,28 @@ def _step_mean(mean, half, sat, dz):  # type: ignore[no-untyped-def]  # numba in
 
 @numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
 def _kernel(  # type: ignore[no-untyped-def]  # numba infers
-        node, rate, g0, g1, g2, r0, r1, r2, weights, width, inverse, forward, sat, dz, x, y, yaw, duration, out):
-    """Fill ``out`` (3 + 4, n) with final x, y, yaw and the wheel travel of n candidates (four wheels)."""
+    node,
+    rate,
+    g0,
+    g1,
+    g2,
+    r0,
+    r1,
+    r2,
+    weights,
+    width,
+    inverse,
+    forward,
+    sat,
+    dz,
+    x,
+    y,
+    yaw,
+    duration,
+    out,
+):
+    """Fill ``out`` (3 + 4, n) with final x, y, yaw and the wheel travel of n candidates (four
+    wheels)."""
     steps, n = g0.shape[0], x.shape[1]
     c, s, ang = np.empty(n), np.empty(n), np.empty(n)
     dev_c, dev_s = np.ones(n), np.zeros(n)
@@ -67,9 +88,24 @@ def _kernel(  # type: ignore[no-untyped-def]  # numba infers
     f20, f21, f22, f23 = forward[2, 0], forward[2, 1], forward[2, 2], forward[2, 3]
     for j in range(n):
         c[j], s[j], ang[j] = np.cos(yaw[0, j]), np.sin(yaw[0, j]), yaw[0, j]
-        dx = rate[0, 0] * x[0, j] + rate[0, 1] * x[1, j] + rate[0, 2] * x[2, j] + rate[0, 3] * x[3, j]
-        dy = rate[0, 0] * y[0, j] + rate[0, 1] * y[1, j] + rate[0, 2] * y[2, j] + rate[0, 3] * y[3, j]
-        da = rate[0, 0] * yaw[0, j] + rate[0, 1] * yaw[1, j] + rate[0, 2] * yaw[2, j] + rate[0, 3] * yaw[3, j]
+        dx = (
+            rate[0, 0] * x[0, j]
+            + rate[0, 1] * x[1, j]
+            + rate[0, 2] * x[2, j]
+            + rate[0, 3] * x[3, j]
+        )
+        dy = (
+            rate[0, 0] * y[0, j]
+            + rate[0, 1] * y[1, j]
+            + rate[0, 2] * y[2, j]
+            + rate[0, 3] * y[3, j]
+        )
+        da = (
+            rate[0, 0] * yaw[0, j]
+            + rate[0, 1] * yaw[1, j]
+            + rate[0, 2] * yaw[2, j]
+            + rate[0, 3] * yaw[3, j]
+        )
         bx, by = c[j] * dx + s[j] * dy, c[j] * dy - s[j] * dx
         w0[j], w1[j] = i00 * bx + i01 * by + i02 * da, i10 * bx + i11 * by + i12 * da
         w2[j], w3[j] = i20 * bx + i21 * by + i22 * da, i30 * bx + i31 * by + i32 * da
@@ -138,7 +174,11 @@ def _kernel(  # type: ignore[no-untyped-def]  # numba infers
             sum_x[j] += ec * dx - es * dy + ch * lx - sh * ly
             sum_y[j] += es * dx + ec * dy + sh * lx + ch * ly
     for j in range(n):
-        out[0, j], out[1, j], out[2, j] = x[0, j] + sum_x[j], y[0, j] + sum_y[j], yaw[3, j] + sum_t[j]
+        out[0, j], out[1, j], out[2, j] = (
+            x[0, j] + sum_x[j],
+            y[0, j] + sum_y[j],
+            yaw[3, j] + sum_t[j],
+        )
         out[3, j], out[4, j], out[5, j], out[6, j] = t0[j], t1[j], t2[j], t3[j]
 
 
@@ -147,19 +187,47 @@ def fits(grid: StepGrid, kinematics: Kinematics, yaw: Array) -> bool:
     if kinematics.inverse.shape != (4, 3) or yaw.shape[0] != 4:
         return False
     steepest = float(np.max(np.abs(np.diff(yaw, axis=0)))) if yaw.size else 0.0
-    return 3.0 * steepest * grid.width < MAX_INCREMENT  # a natural cubic is at most 3 times its chord's slope
+    return (
+        3.0 * steepest * grid.width < MAX_INCREMENT
+    )  # a natural cubic is at most 3 times its chord's slope
 
 
-def roll_out_swarm(grid: StepGrid, kinematics: Kinematics, actuator: Actuator, x: Array, y: Array, yaw: Array,
-                   duration: Array) -> Array:
-    """(7, n): final x, y, yaw and travel of four wheels of n candidates: see ``rollout.roll_out``."""
+def roll_out_swarm(
+    grid: StepGrid,
+    kinematics: Kinematics,
+    actuator: Actuator,
+    x: Array,
+    y: Array,
+    yaw: Array,
+    duration: Array,
+) -> Array:
+    """(7, n): final x, y, yaw and travel of four wheels of n candidates: see
+    ``rollout.roll_out``."""
     n = max(a.shape[1] for a in (x, y, yaw))
     full = [np.ascontiguousarray(np.broadcast_to(a, (4, n))) for a in (x, y, yaw)]
     out = np.empty((7, n))
     saturation = min(actuator.saturation, 1e300)  # inf would give inf - inf
     g0, g1, g2 = grid.gauss_value
     r0, r1, r2 = grid.gauss_rate
-    _kernel(grid.node_value, grid.node_rate, g0, g1, g2, r0, r1, r2, GAUSS_WEIGHTS, grid.width, kinematics.inverse,
-            kinematics.forward, saturation, actuator.dead_zone, full[0], full[1], full[2],
-            np.ascontiguousarray(np.broadcast_to(np.ravel(duration), (n,)), dtype=np.float64), out)
+    _kernel(
+        grid.node_value,
+        grid.node_rate,
+        g0,
+        g1,
+        g2,
+        r0,
+        r1,
+        r2,
+        GAUSS_WEIGHTS,
+        grid.width,
+        kinematics.inverse,
+        kinematics.forward,
+        saturation,
+        actuator.dead_zone,
+        full[0],
+        full[1],
+        full[2],
+        np.ascontiguousarray(np.broadcast_to(np.ravel(duration), (n,)), dtype=np.float64),
+        out,
+    )
     return out

@@ -1,8 +1,8 @@
 """Duration as the cost: the time that time scaling needs along the candidate path.
 
-Wheel angles at the end do not depend on timing, so they are a constraint here: the violation is what the
-critical wheels' deviations exceed their tolerance by. The lattice meets it exactly and picks the fastest
-solution; population methods handle it by Deb's rule.
+Wheel angles at the end do not depend on timing, so they are a constraint here: the violation is
+what the critical wheels' deviations exceed their tolerance by. The lattice meets it exactly and
+picks the fastest solution; population methods handle it by Deb's rule.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ SEARCH_GRIDPOINTS = 60  # of the time scaling inside a search; the score uses th
 
 @dataclass(frozen=True)
 class DurationObjective:
-    """Duration (s) over the free control values of ``terminal``'s problem, wheel angles as a constraint."""
+    """Duration (s) over the free control values of ``terminal``'s problem, wheel angles as a
+    constraint."""
 
     terminal: TerminalObjective
     gridpoints: int = SEARCH_GRIDPOINTS
@@ -56,8 +57,12 @@ class DurationObjective:
         """Least duration, s; inf where the limits allow no motion along this path."""
         problem = self.terminal.problem
         try:
-            return time_scale(self.path(candidate), problem.limits.as_limits(), robot=self.terminal.robot,
-                              gridpoints=gridpoints).duration
+            return time_scale(
+                self.path(candidate),
+                problem.limits.as_limits(),
+                robot=self.terminal.robot,
+                gridpoints=gridpoints,
+            ).duration
         except InfeasibleError:
             return float(np.inf)
 
@@ -68,25 +73,32 @@ class DurationObjective:
         return np.asarray(np.maximum(worst - section.wheel_tolerance, 0.0))
 
     def evaluate(self, candidates: Array) -> Evaluation:
-        """Durations are computed only where the wheel angles are within tolerance: elsewhere Deb's rule
-        compares violations and the path length (m) stands in for the cost. Where the limits allow no motion,
-        both are inf."""
+        """Durations are computed only where the wheel angles are within tolerance: elsewhere Deb's
+        rule compares violations and the path length (m) stands in for the cost. Where the limits
+        allow no motion, both are inf."""
         candidates = np.asarray(candidates, dtype=np.float64)
         violation = self._violation(candidates)
-        cost = np.array([self._duration(row, self.gridpoints) if v == 0.0 else self.path(row).length
-                         for row, v in zip(candidates, violation, strict=True)])
+        cost = np.array(
+            [
+                self._duration(row, self.gridpoints) if v == 0.0 else self.path(row).length
+                for row, v in zip(candidates, violation, strict=True)
+            ]
+        )
         return Evaluation(cost, np.where(np.isfinite(cost), violation, np.inf))
 
     def score(self, candidate: Array) -> Evaluation:
         duration = self._duration(candidate, None)
-        violation = self._violation(candidate[None]) if np.isfinite(duration) else np.array([np.inf])
+        violation = (
+            self._violation(candidate[None]) if np.isfinite(duration) else np.array([np.inf])
+        )
         return Evaluation(np.array([duration]), violation)
 
     def terms(self, candidate: Array) -> dict[str, float]:
         """Named terms of one candidate (d,): the duration in s."""
         return {"duration": self._duration(candidate, None)}
 
-    # -- the lattice, through the terminal objective --------------------------------------------------
+    # -- the lattice, through the terminal objective
+    # --------------------------------------------------
 
     def affine_part(self) -> AffinePart:
         return self.terminal.affine_part()

@@ -1,7 +1,8 @@
-"""Mean isotropy as a smooth function of split/offset, for optimisers: a cubic spline through the quadrature.
+"""Mean isotropy as a smooth function of split/offset, for optimisers: a cubic spline through the
+quadrature.
 
-The quadrature itself has kinks (where a tilted module is isotropic) and costs milliseconds; the spline costs
-nothing, is twice differentiable and runs on numbers and symbols alike.
+The quadrature itself has kinks (where a tilted module is isotropic) and costs milliseconds; the
+spline costs nothing, is twice differentiable and runs on numbers and symbols alike.
 """
 
 from __future__ import annotations
@@ -19,14 +20,18 @@ Array = NDArray[np.float64]
 
 LOWEST_RATIO, HIGHEST_RATIO = 0.5, 10.0  # split/offset that the design space can reach, chosen
 PEAK = (1.4, 4.0)  # ratios between which knots are dense, chosen: Table II's optima lie inside
-DENSE, COARSE = 24, 5  # knots inside and on either side; error below 2e-3, 6e-3 at the kink 2/cos(tilt); chosen
+DENSE, COARSE = (
+    24,
+    5,
+)  # knots inside and on either side; error below 2e-3, 6e-3 at the kink 2/cos(tilt); chosen
 POINTS, SHIFTS = 512, 2  # of the quadrature at each knot; error below 5e-4, chosen
 QUADRATURE_SEED = 0  # fixes the shifts of the quadrature, so that the curve is the same every time
 
 
 @dataclass(frozen=True, eq=False)
 class IsotropyCurve:
-    """Natural cubic spline in x = ln(ratio), written twice: local cubics, and a line plus truncated cubes."""
+    """Natural cubic spline in x = ln(ratio), written twice: local cubics, and a line plus truncated
+    cubes."""
 
     knots: Array  # (k,) ln(ratio)
     local: Array  # (k - 1, 4) coefficients of 1, dx, dx^2, dx^3 from each knot
@@ -38,11 +43,15 @@ class IsotropyCurve:
         if isinstance(x, np.ndarray) and x.ndim > 0:
             return self._local(x)
         beyond = np.maximum(x - self.knots[:-1], 0.0)
-        return self.local[0, 0] + self.local[0, 1] * (x - self.knots[0]) + np.sum(
-            self.cubes * beyond * beyond * beyond)
+        return (
+            self.local[0, 0]
+            + self.local[0, 1] * (x - self.knots[0])
+            + np.sum(self.cubes * beyond * beyond * beyond)
+        )
 
     def _local(self, x: Array) -> Array:
-        """The same curve by looking the interval up: fast on arrays of designs (equal to rounding)."""
+        """The same curve by looking the interval up: fast on arrays of designs (equal to
+        rounding)."""
         i = np.clip(np.searchsorted(self.knots, x, side="right") - 1, 0, len(self.local) - 1)
         d = x - self.knots[i]
         a, b, c, e = (self.local[:, k][i] for k in range(4))
@@ -51,15 +60,31 @@ class IsotropyCurve:
 
 @lru_cache(maxsize=16)
 def isotropy_curve(modules: int, tilt: float) -> IsotropyCurve:
-    """The curve of N equally spaced modules that tilt by {-tilt, 0, +tilt} (rad) independently (Table II)."""
+    """The curve of N equally spaced modules that tilt by {-tilt, 0, +tilt} (rad) independently
+    (Table II)."""
     low, high = np.log(PEAK)
-    x = np.concatenate([np.linspace(np.log(LOWEST_RATIO), low, COARSE, endpoint=False),
-                        np.linspace(low, high, DENSE, endpoint=False),
-                        np.linspace(high, np.log(HIGHEST_RATIO), COARSE + 1)])
+    x = np.concatenate(
+        [
+            np.linspace(np.log(LOWEST_RATIO), low, COARSE, endpoint=False),
+            np.linspace(low, high, DENSE, endpoint=False),
+            np.linspace(high, np.log(HIGHEST_RATIO), COARSE + 1),
+        ]
+    )
     places, tilts = spread_modules(modules), ((-tilt, 0.0, tilt) if tilt else (0.0,))
-    values = np.array([
-        mean_isotropy(places, float(r), rng=np.random.default_rng(QUADRATURE_SEED), tilts=tilts,
-                      jacobian="forward", points=POINTS, shifts=SHIFTS).value for r in np.exp(x)])
+    values = np.array(
+        [
+            mean_isotropy(
+                places,
+                float(r),
+                rng=np.random.default_rng(QUADRATURE_SEED),
+                tilts=tilts,
+                jacobian="forward",
+                points=POINTS,
+                shifts=SHIFTS,
+            ).value
+            for r in np.exp(x)
+        ]
+    )
     return _natural_spline(x, values)
 
 

@@ -1,13 +1,14 @@
-"""Kinematic prediction: where a spline motion ends, and with which wheel angles, through real actuators.
+"""Kinematic prediction: where a spline motion ends, and with which wheel angles, through real
+actuators.
 
-One set of formulas on component arrays, used for a single candidate, for a swarm (candidates in columns)
-and, unchanged, on CasADi expressions. Steps run along axis 0.
+One set of formulas on component arrays, used for a single candidate, for a swarm (candidates in
+columns) and, unchanged, on CasADi expressions. Steps run along axis 0.
 
 The mean wheel speed of a step is the exact integral (Gauss quadrature) of W R(-psi) p', so without
-actuator limits the final wheel angles are exact on any grid. Inside a step the wheel speed is taken as
-linear, with that mean and the span of the nodal speeds, and passed through the actuator exactly. What the
-actuator takes away turns and shifts the robot: heading deviations add up, and displacements are rotated by
-the deviation at mid-step.
+actuator limits the final wheel angles are exact on any grid. Inside a step the wheel speed is taken
+as linear, with that mean and the span of the nodal speeds, and passed through the actuator exactly.
+What the actuator takes away turns and shifts the robot: heading deviations add up, and
+displacements are rotated by the deviation at mid-step.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from trajopt.robots.actuator import Actuator
 
 Array = NDArray[np.float64]
 
-_GAUSS_X, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)  # step means exact to 1e-12 rad at 250 steps
+_GAUSS_X, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(
+    3
+)  # step means exact to 1e-12 rad at 250 steps
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,8 @@ class Kinematics:
 
 @dataclass(frozen=True)
 class StepGrid:
-    """Spline matrices at the nodes, middles and Gauss points of equal steps along the spline parameter."""
+    """Spline matrices at the nodes, middles and Gauss points of equal steps along the spline
+    parameter."""
 
     steps: int
     width: float  # of one step, in spline parameter
@@ -53,24 +57,32 @@ class StepGrid:
 def step_grid(basis: SplineBasis, steps: int) -> StepGrid:
     """Constant matrices of ``steps`` equal steps over the whole spline.
 
-    ``steps`` must be a multiple of the number of segments (equal ones), because a step across a knot would
-    cost the quadrature its order; ArgumentError otherwise.
+    ``steps`` must be a multiple of the number of segments (equal ones), because a step across a
+    knot would cost the quadrature its order; ArgumentError otherwise.
     """
     segments = np.diff(basis.knots)
     if steps < 1 or steps % len(segments) or not np.allclose(segments, segments[0], rtol=1e-12):
-        raise ArgumentError("steps", steps, f"a positive multiple of the {len(segments)} equal spline segments")
+        raise ArgumentError(
+            "steps", steps, f"a positive multiple of the {len(segments)} equal spline segments"
+        )
     nodes = np.linspace(basis.knots[0], basis.knots[-1], steps + 1)
     width = float(nodes[1] - nodes[0])
     gauss = [nodes[:-1] + width * (1 + x) / 2 for x in _GAUSS_X]
     return StepGrid(
-        steps, width, basis.matrix(nodes), basis.matrix(nodes, 1), basis.matrix(nodes[:-1] + width / 2),
-        tuple(basis.matrix(u) for u in gauss), tuple(basis.matrix(u, 1) for u in gauss),
+        steps,
+        width,
+        basis.matrix(nodes),
+        basis.matrix(nodes, 1),
+        basis.matrix(nodes[:-1] + width / 2),
+        tuple(basis.matrix(u) for u in gauss),
+        tuple(basis.matrix(u, 1) for u in gauss),
     )
 
 
 @dataclass(frozen=True)
 class Terminal:
-    """Final state of n candidates: x, y (m), yaw (rad), and the wheel angles gained, one entry a wheel (rad)."""
+    """Final state of n candidates: x, y (m), yaw (rad), and the wheel angles gained, one entry a
+    wheel (rad)."""
 
     x: Any
     y: Any
@@ -79,7 +91,8 @@ class Terminal:
 
 
 def wheel_travel(grid: StepGrid, kinematics: Kinematics, x: Any, y: Any, yaw: Any) -> list[Any]:
-    """Wheel rotation in each step, rad: W lists of (steps, n). ``x``, ``y``, ``yaw`` are control values (K, n)."""
+    """Wheel rotation in each step, rad: W lists of (steps, n). ``x``, ``y``, ``yaw`` are control
+    values (K, n)."""
     body_x, body_y = 0.0, 0.0
     for value, rate, weight in zip(grid.gauss_value, grid.gauss_rate, GAUSS_WEIGHTS, strict=True):
         angle = value @ yaw
@@ -102,20 +115,32 @@ def wheel_span(grid: StepGrid, kinematics: Kinematics, x: Any, y: Any, yaw: Any)
     return [(rate[1:] - rate[:-1]) / 2 for rate in rates]
 
 
-def roll_out(grid: StepGrid, kinematics: Kinematics, actuator: Actuator,
-             x: Any, y: Any, yaw: Any, duration: Any) -> Terminal:
-    """Final state of motions executed at uniform spline speed in ``duration`` seconds (scalar or (1, n)).
+def roll_out(
+    grid: StepGrid,
+    kinematics: Kinematics,
+    actuator: Actuator,
+    x: Any,
+    y: Any,
+    yaw: Any,
+    duration: Any,
+) -> Terminal:
+    """Final state of motions executed at uniform spline speed in ``duration`` seconds (scalar or
+    (1, n)).
 
     ``x``, ``y`` (m) and ``yaw`` (rad) are control values (K, n), one column a candidate.
     """
     travel = wheel_travel(grid, kinematics, x, y, yaw)
     if actuator.is_ideal:
-        return Terminal(x[-1:], y[-1:], yaw[-1:], tuple(np.sum(q, axis=0, keepdims=True) for q in travel))
+        return Terminal(
+            x[-1:], y[-1:], yaw[-1:], tuple(np.sum(q, axis=0, keepdims=True) for q in travel)
+        )
     step_time = duration / grid.steps
     rate_scale = grid.width / step_time  # spline parameter per second
     span = wheel_span(grid, kinematics, x, y, yaw)
-    actual = [actuator.step_mean(q / step_time, d * rate_scale) * step_time
-              for q, d in zip(travel, span, strict=True)]
+    actual = [
+        actuator.step_mean(q / step_time, d * rate_scale) * step_time
+        for q, d in zip(travel, span, strict=True)
+    ]
     lost = [a - q for a, q in zip(actual, travel, strict=True)]
     shift_x, shift_y, turn = (_weighted(row, lost) for row in kinematics.forward.tolist())
     deviation = np.cumsum(turn, axis=0) - turn / 2  # of the heading, at mid-step

@@ -1,11 +1,11 @@
 """The terminal cost of whole swarms with a prescribed heading, as a numba kernel.
 
-Where the heading is the same for all candidates, everything trigonometric is too: each step's wheel travel,
-half the change of its wheel rates and its displacement are affine in the free control points, with
-coefficients that are computed once a problem. What remains a candidate and a step is the actuator, the small
-rotation by which the lost wheel travel turned the robot, and sums. Candidates run in blocks of LANES, so that
-the innermost loop is one vector instruction after the other. A test holds the result together with
-``rollout.roll_out`` to 1e-12.
+Where the heading is the same for all candidates, everything trigonometric is too: each step's wheel
+travel, half the change of its wheel rates and its displacement are affine in the free control
+points, with coefficients that are computed once a problem. What remains a candidate and a step is
+the actuator, the small rotation by which the lost wheel travel turned the robot, and sums.
+Candidates run in blocks of LANES, so that the innermost loop is one vector instruction after the
+other. A test holds the result together with ``rollout.roll_out`` to 1e-12.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from trajopt.robots.actuator import SMALL_SPAN, Actuator
 
 Array = NDArray[np.float64]
 
-LANES = 4  # candidates a block: one vector of doubles (AVX2); 8 and 16 measured slower, registers spill
+LANES = (
+    4  # candidates a block: one vector of doubles (AVX2); 8 and 16 measured slower, registers spill
+)
 # Rows of a block's state, each LANES long.
 _Y1, _X2, _Y2, _SAT, _DZ, _TINY, _COS, _SIN, _TURN = (LANES * i for i in range(1, 10))
 _SUM_X, _SUM_Y, _SUM_YAW, _W0, _W1, _W2, _W3 = (LANES * i for i in range(10, 17))
@@ -34,7 +36,8 @@ _SUMS = 10  # first row that is added up over the steps
 def step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]  # numba infers
     """Actuator.step_mean in wheel travel: mean d, half-span h, limits as travel a step.
 
-    Half-spans below ``tiny`` are widened to it, which changes nothing but exactly at a kink of the actuator.
+    Half-spans below ``tiny`` are widened to it, which changes nothing but exactly at a kink of the
+    actuator.
     """
     half = max(abs(h), tiny)
     low, high = d - half, d + half
@@ -56,7 +59,8 @@ def turned(c, s, a):  # type: ignore[no-untyped-def]  # numba infers
 
 @numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
 def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba infers
-    """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in place."""
+    """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in
+    place."""
     i00, i01, i10, i11 = inverse[0, 0], inverse[0, 1], inverse[1, 0], inverse[1, 1]
     i20, i21, i30, i31 = inverse[2, 0], inverse[2, 1], inverse[3, 0], inverse[3, 1]
     f00, f01, f02, f03 = forward[0, 0], forward[0, 1], forward[0, 2], forward[0, 3]
@@ -103,9 +107,11 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba i
 
 @numba.njit(cache=True, error_model="numpy")
 def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]  # numba infers
-    """Fill ``out`` (7, n) for candidates ``z`` (n, d): final x, y, yaw and the travel of four wheels.
+    """Fill ``out`` (7, n) for candidates ``z`` (n, d): final x, y, yaw and the travel of four
+    wheels.
 
-    ``places`` (5,): where x1, y1, x2, y2 and the duration stand in a candidate, or -1 for ``fixed``'s value.
+    ``places`` (5,): where x1, y1, x2, y2 and the duration stand in a candidate, or -1 for
+    ``fixed``'s value.
     """
     n = z.shape[0]
     steps = co.shape[0]
@@ -116,7 +122,11 @@ def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type:
             for r in range(4):
                 st[r * LANES + j] = z[i, places[r]] if places[r] >= 0 else fixed[r]
             dt = (z[i, places[4]] if places[4] >= 0 else fixed[4]) / steps
-            st[_SAT + j], st[_DZ + j], st[_TINY + j] = limits[0] * dt, limits[1] * dt, 0.5 * limits[2] * dt
+            st[_SAT + j], st[_DZ + j], st[_TINY + j] = (
+                limits[0] * dt,
+                limits[1] * dt,
+                0.5 * limits[2] * dt,
+            )
             st[_COS + j] = 1.0
             for r in range(_SUMS - 2, _ROWS):
                 st[r * LANES + j] = 0.0
@@ -141,7 +151,8 @@ def terminal_costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type
 
 @dataclass(frozen=True)
 class Goal:
-    """What the cost compares with: final pose (3,), wheel travel (4,), their gains, and the period, rad."""
+    """What the cost compares with: final pose (3,), wheel travel (4,), their gains, and the period,
+    rad."""
 
     pose: Array
     gains: Array
@@ -152,7 +163,8 @@ class Goal:
 
 @dataclass(frozen=True)
 class PrescribedSwarm:
-    """Compiled prediction and cost for one problem whose heading is prescribed; ``prepared`` makes it."""
+    """Compiled prediction and cost for one problem whose heading is prescribed; ``prepared`` makes
+    it."""
 
     coefficients: Array  # (steps, 34)
     inverse: Array
@@ -170,24 +182,49 @@ class PrescribedSwarm:
         """(7, n): final x, y (m), yaw and wheel travel (rad) of candidates (n, d)."""
         z = np.ascontiguousarray(candidates, dtype=np.float64)
         out = np.empty((7, len(z)))
-        _swarm(self.coefficients, self.inverse, self.forward, z, self.places, self.fixed, self.limits,
-               self.start, out)
+        _swarm(
+            self.coefficients,
+            self.inverse,
+            self.forward,
+            z,
+            self.places,
+            self.fixed,
+            self.limits,
+            self.start,
+            out,
+        )
         return out
 
     def cost(self, candidates: Array, goal: Goal) -> Array:
         """(n,): terminal cost of candidates (n, d)."""
         cost = np.empty(len(candidates))
-        terminal_costs(self.predict(candidates), goal.pose, goal.gains, goal.travel, goal.wheel_gains, goal.period,
-                       cost)
+        terminal_costs(
+            self.predict(candidates),
+            goal.pose,
+            goal.gains,
+            goal.travel,
+            goal.wheel_gains,
+            goal.period,
+            cost,
+        )
         return cost
 
 
-def prepared(grid: StepGrid, kinematics: Kinematics, actuator: Actuator, x: Array, y: Array, yaw: Array,
-             duration: float, places: NDArray[np.int64]) -> PrescribedSwarm:
-    """Coefficients for control values ``x``, ``y``, ``yaw`` (4,), of which P1 and P2 may be replaced.
+def prepared(
+    grid: StepGrid,
+    kinematics: Kinematics,
+    actuator: Actuator,
+    x: Array,
+    y: Array,
+    yaw: Array,
+    duration: float,
+    places: NDArray[np.int64],
+) -> PrescribedSwarm:
+    """Coefficients for control values ``x``, ``y``, ``yaw`` (4,), of which P1 and P2 may be
+    replaced.
 
-    ``places`` (5,): positions of x1, y1, x2, y2 and the duration in a candidate, -1 where they keep the
-    given value. Needs four wheels and four control points.
+    ``places`` (5,): positions of x1, y1, x2, y2 and the duration in a candidate, -1 where they keep
+    the given value. Needs four wheels and four control points.
     """
     half = grid.width / 2
     mean_x = np.zeros((grid.steps, 8))  # body displacement a step, as a row over (x0..x3, y0..y3)
@@ -202,18 +239,35 @@ def prepared(grid: StepGrid, kinematics: Kinematics, actuator: Actuator, x: Arra
     turn, turn_span = np.diff(grid.node_value @ yaw), half * np.diff(grid.node_rate @ yaw)
     spin = kinematics.inverse[:, 2]
     parts = [_affine(rows, x, y) for rows in (mean_x, mean_y, span_x, span_y)]
-    ends = np.column_stack([shift[:, [0, 3]] @ x[[0, 3]], shift[:, [0, 3]] @ y[[0, 3]], shift[:, 1], shift[:, 2]])
-    table = np.column_stack([*parts, ends, np.cos(middle), np.sin(middle), turn[:, None] * spin,
-                             turn_span[:, None] * spin])
+    ends = np.column_stack(
+        [shift[:, [0, 3]] @ x[[0, 3]], shift[:, [0, 3]] @ y[[0, 3]], shift[:, 1], shift[:, 2]]
+    )
+    table = np.column_stack(
+        [
+            *parts,
+            ends,
+            np.cos(middle),
+            np.sin(middle),
+            turn[:, None] * spin,
+            turn_span[:, None] * spin,
+        ]
+    )
     limits = np.array([min(actuator.saturation, 1e300), actuator.dead_zone, SMALL_SPAN])
     start = np.array([x[0], y[0], yaw[3], 0.0, 0.0, 0.0, 0.0])
-    return PrescribedSwarm(np.ascontiguousarray(table), np.ascontiguousarray(kinematics.inverse),
-                           np.ascontiguousarray(kinematics.forward), places,
-                           np.array([x[1], y[1], x[2], y[2], duration]), limits, start)
+    return PrescribedSwarm(
+        np.ascontiguousarray(table),
+        np.ascontiguousarray(kinematics.inverse),
+        np.ascontiguousarray(kinematics.forward),
+        places,
+        np.array([x[1], y[1], x[2], y[2], duration]),
+        limits,
+        start,
+    )
 
 
 def _body_rows(angle: Array, rate: Array) -> tuple[Array, Array]:
-    """(steps, 8) rows over (x0..x3, y0..y3) of the body-frame rate of the position at headings ``angle``."""
+    """(steps, 8) rows over (x0..x3, y0..y3) of the body-frame rate of the position at headings
+    ``angle``."""
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     return np.hstack([c * rate, s * rate]), np.hstack([-s * rate, c * rate])
 

@@ -2,8 +2,8 @@
 
     S = gains . |pose error| + wheel_gain * sum over critical wheels of |folded wheel deviation|
 
-The wheel deviation is the circular distance modulo the period, folded to [0, period/2]; with the period
-2 pi and the gains of Table 5.8 this recomputes Tables 5.5 and 5.6.
+The wheel deviation is the circular distance modulo the period, folded to [0, period/2]; with the
+period 2 pi and the gains of Table 5.8 this recomputes Tables 5.5 and 5.6.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ Array = NDArray[np.float64]
 
 SEARCH_STEPS = 252  # 84 steps a spline segment, 14 to 20 ms on the problems at hand; chosen
 COARSE_STEPS = 84  # steps for Newton steps, chosen
-HEADING_MARGIN = np.pi / 2  # rad beyond start and goal heading for free heading control points, chosen
+HEADING_MARGIN = (
+    np.pi / 2
+)  # rad beyond start and goal heading for free heading control points, chosen
 DURATION_RANGE = (0.25, 4.0)  # times the nominal duration, for a free duration, chosen
 
 
@@ -49,7 +51,8 @@ class ControlPoints:
 class TerminalObjective:
     """Table 4.4 over the free control values of ``problem``.
 
-    Decision variables, in this order where free: x1, y1 (p1), x2, y2 (p2), yaw1, yaw2 (heading), duration.
+    Decision variables, in this order where free: x1, y1 (p1), x2, y2 (p2), yaw1, yaw2 (heading),
+    duration.
     """
 
     problem: Problem
@@ -58,7 +61,9 @@ class TerminalObjective:
     kinematics: Kinematics | None = None  # None: the robot's own; given only to compare conventions
 
     def __post_init__(self) -> None:
-        step_grid(self.basis, self.steps)  # raises for steps that do not fit, even where no grid is used later
+        step_grid(
+            self.basis, self.steps
+        )  # raises for steps that do not fit, even where no grid is used later
 
     @property
     def basis(self) -> SplineBasis:
@@ -75,26 +80,36 @@ class TerminalObjective:
 
     @property
     def is_affine(self) -> bool:
-        """Whether the critical wheel angles are affine in the decision variables (modulo the period)."""
+        """Whether the critical wheel angles are affine in the decision variables (modulo the
+        period)."""
         return self.actuator.is_ideal and set(self.problem.spline.free) <= {"p1", "p2"}
 
     @property
     def provides(self) -> frozenset[Capability]:
         always = {Capability.BATCH, Capability.RESIDUALS, Capability.SYMBOLIC}
-        return frozenset(always | ({Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set()))
+        return frozenset(
+            always | ({Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set())
+        )
 
     @property
     def constrained(self) -> bool:
         return False
 
-    # -- decision variables ---------------------------------------------------------------------------
+    # -- decision variables
+    # ---------------------------------------------------------------------------
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the decision variables with their units."""
-        parts = {"p1": ("p1.x_m", "p1.y_m"), "p2": ("p2.x_m", "p2.y_m"),
-                 "heading": ("p1.yaw_rad", "p2.yaw_rad"), "duration": ("duration_s",)}
-        return tuple(name for key in parts if key in self.problem.spline.free for name in parts[key])
+        parts = {
+            "p1": ("p1.x_m", "p1.y_m"),
+            "p2": ("p2.x_m", "p2.y_m"),
+            "heading": ("p1.yaw_rad", "p2.yaw_rad"),
+            "duration": ("duration_s",),
+        }
+        return tuple(
+            name for key in parts if key in self.problem.spline.free for name in parts[key]
+        )
 
     @property
     def dimension(self) -> int:
@@ -102,20 +117,33 @@ class TerminalObjective:
 
     @cached_property
     def bounds(self) -> Array:
-        """(d, 2): the navigation space for points; margins around start and goal for heading; duration."""
+        """(d, 2): the navigation space for points; margins around start and goal for heading;
+        duration."""
         p = self.problem
         yaws = (p.start.pose[2], p.goal.pose[2])
         heading = (min(yaws) - HEADING_MARGIN, max(yaws) + HEADING_MARGIN)
-        by_suffix = {"x_m": p.space.x, "y_m": p.space.y, "yaw_rad": heading,
-                     "duration_s": tuple(f * p.spline.duration for f in DURATION_RANGE)}
+        by_suffix = {
+            "x_m": p.space.x,
+            "y_m": p.space.y,
+            "yaw_rad": heading,
+            "duration_s": tuple(f * p.spline.duration for f in DURATION_RANGE),
+        }
         return np.array([by_suffix[name.split(".")[-1]] for name in self.names], dtype=np.float64)
 
     @cached_property
     def default(self) -> Array:
-        """(d,): the thesis's P1 (Table 5.4, kept inside the space), P2 on the far third, linear heading."""
+        """(d,): the thesis's P1 (Table 5.4, kept inside the space), P2 on the far third, linear
+        heading."""
         p1, p2, yaw = self._fixed_points
-        values = {"p1.x_m": p1[0], "p1.y_m": p1[1], "p2.x_m": p2[0], "p2.y_m": p2[1],
-                  "p1.yaw_rad": yaw[0], "p2.yaw_rad": yaw[1], "duration_s": self.problem.spline.duration}
+        values = {
+            "p1.x_m": p1[0],
+            "p1.y_m": p1[1],
+            "p2.x_m": p2[0],
+            "p2.y_m": p2[1],
+            "p1.yaw_rad": yaw[0],
+            "p2.yaw_rad": yaw[1],
+            "duration_s": self.problem.spline.duration,
+        }
         return np.clip([values[name] for name in self.names], self.bounds[:, 0], self.bounds[:, 1])
 
     @property
@@ -126,47 +154,75 @@ class TerminalObjective:
         return p1, p2, (a0 + (af - a0) / 3, a0 + (af - a0) * 2 / 3)
 
     def control_points(self, z: Any) -> ControlPoints:
-        """Control values from decision variables ``z`` (d, n): arrays or symbols, candidates in columns."""
+        """Control values from decision variables ``z`` (d, n): arrays or symbols, candidates in
+        columns."""
         free, column = self.problem.spline.free, 0 * z[0:1]
         rows = dict(zip(self.names, (z[i : i + 1] for i in range(self.dimension)), strict=True))
         (x0, y0, a0), (xf, yf, af) = self.problem.start.pose, self.problem.goal.pose
         p1, p2, yaw = self._fixed_points
-        x1, y1 = (rows["p1.x_m"], rows["p1.y_m"]) if "p1" in free else (column + p1[0], column + p1[1])
-        x2, y2 = (rows["p2.x_m"], rows["p2.y_m"]) if "p2" in free else (column + p2[0], column + p2[1])
+        x1, y1 = (
+            (rows["p1.x_m"], rows["p1.y_m"]) if "p1" in free else (column + p1[0], column + p1[1])
+        )
+        x2, y2 = (
+            (rows["p2.x_m"], rows["p2.y_m"]) if "p2" in free else (column + p2[0], column + p2[1])
+        )
         a1, a2 = column + yaw[0], column + yaw[1]
         if "heading" in free:
             a1, a2 = rows["p1.yaw_rad"], rows["p2.yaw_rad"]
-        duration = rows["duration_s"] if "duration" in free else column + self.problem.spline.duration
+        duration = (
+            rows["duration_s"] if "duration" in free else column + self.problem.spline.duration
+        )
         return ControlPoints(
-            np.vstack([column + x0, x1, x2, column + xf]), np.vstack([column + y0, y1, y2, column + yf]),
-            np.vstack([column + a0, a1, a2, column + af]), duration)
+            np.vstack([column + x0, x1, x2, column + xf]),
+            np.vstack([column + y0, y1, y2, column + yf]),
+            np.vstack([column + a0, a1, a2, column + af]),
+            duration,
+        )
 
     def path(self, candidate: Array) -> Path:
         """The path through the control points of one candidate (d,)."""
         points = self.control_points(np.asarray(candidate, dtype=np.float64)[:, None])
-        return Path(self.basis, np.column_stack([points.x[:, 0], points.y[:, 0]]), points.yaw[:, 0],
-                    self.robot.turning_length)
+        return Path(
+            self.basis,
+            np.column_stack([points.x[:, 0], points.y[:, 0]]),
+            points.yaw[:, 0],
+            self.robot.turning_length,
+        )
 
-    # -- cost -----------------------------------------------------------------------------------------
+    # -- cost
+    # -----------------------------------------------------------------------------------------
 
     def predict(self, z: Any) -> Terminal:
-        """Final state on the search grid, for decision variables (d, n); compiled where that is possible."""
+        """Final state on the search grid, for decision variables (d, n); compiled where that is
+        possible."""
         points = self.control_points(z)
         grid = step_grid(self.basis, self.steps)
         if isinstance(z, np.ndarray) and not self.actuator.is_ideal and swarm_engine() == "numba":
             from trajopt.objectives import compiled
 
             if compiled.fits(grid, self.model, points.yaw):
-                end = compiled.roll_out_swarm(grid, self.model, self.actuator, points.x, points.y, points.yaw,
-                                              points.duration)
-                return Terminal(end[0:1], end[1:2], end[2:3], tuple(end[i : i + 1] for i in range(3, 7)))
-        return roll_out(grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration)
+                end = compiled.roll_out_swarm(
+                    grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration
+                )
+                return Terminal(
+                    end[0:1], end[1:2], end[2:3], tuple(end[i : i + 1] for i in range(3, 7))
+                )
+        return roll_out(
+            grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration
+        )
 
     def predict_exactly(self, candidate: Array) -> Terminal:
         """Final state of one candidate (d,), free of grid error."""
         points = self.control_points(np.asarray(candidate, dtype=np.float64)[:, None])
-        return exact_terminal(self.basis, self.model, self.actuator, points.x[:, 0], points.y[:, 0],
-                              points.yaw[:, 0], float(points.duration[0, 0]))
+        return exact_terminal(
+            self.basis,
+            self.model,
+            self.actuator,
+            points.x[:, 0],
+            points.y[:, 0],
+            points.yaw[:, 0],
+            float(points.duration[0, 0]),
+        )
 
     def wheel_errors(self, final: Terminal) -> list[Any]:
         """Critical wheel angle minus wanted angle, unfolded, rad, one entry a critical wheel."""
@@ -181,8 +237,12 @@ class TerminalObjective:
     def named_terms(self, final: Terminal) -> dict[str, Any]:
         """The terms of Table 4.4 by name; they sum to the cost."""
         section = self.problem.objective
-        terms = {name: gain * np.abs(error) for name, gain, error in
-                 zip(("x", "y", "yaw"), section.pose_gains, self.pose_errors(final), strict=True)}
+        terms = {
+            name: gain * np.abs(error)
+            for name, gain, error in zip(
+                ("x", "y", "yaw"), section.pose_gains, self.pose_errors(final), strict=True
+            )
+        }
         for name, error in zip(self.problem.goal.critical, self.wheel_errors(final), strict=True):
             terms[f"wheel {name}"] = section.wheel_gain * np.abs(folded(error, section.period))
         return terms
@@ -193,31 +253,49 @@ class TerminalObjective:
 
     @cached_property
     def _prescribed(self) -> Any:
-        """The compiled swarm (``objectives.swarm``, or ``heading_swarm`` where the heading is free) and what it
-        compares with; None where it does not apply."""
-        if self.actuator.is_ideal or self.model.inverse.shape != (4, 3) or swarm_engine() != "numba":
+        """The compiled swarm (``objectives.swarm``, or ``heading_swarm`` where the heading is free)
+        and what it compares with; None where it does not apply."""
+        if (
+            self.actuator.is_ideal
+            or self.model.inverse.shape != (4, 3)
+            or swarm_engine() != "numba"
+        ):
             return None
         from trajopt.objectives import heading_swarm, swarm
 
         points = self.control_points(self.default[:, None])
         heading = ("p1.yaw_rad", "p2.yaw_rad") if "heading" in self.problem.spline.free else ()
-        rows = [self.names.index(name) if name in self.names else -1
-                for name in ("p1.x_m", "p1.y_m", "p2.x_m", "p2.y_m", *heading, "duration_s")]
+        rows = [
+            self.names.index(name) if name in self.names else -1
+            for name in ("p1.x_m", "p1.y_m", "p2.x_m", "p2.y_m", *heading, "duration_s")
+        ]
         prepared = heading_swarm.prepared if heading else swarm.prepared
-        plan = prepared(step_grid(self.basis, self.steps), self.model, self.actuator, points.x[:, 0], points.y[:, 0],
-                        points.yaw[:, 0], float(points.duration[0, 0]), np.array(rows))
+        plan = prepared(
+            step_grid(self.basis, self.steps),
+            self.model,
+            self.actuator,
+            points.x[:, 0],
+            points.y[:, 0],
+            points.yaw[:, 0],
+            float(points.duration[0, 0]),
+            np.array(rows),
+        )
         section, goal = self.problem.objective, self.problem.goal
         wheel_gains = np.zeros(4)
         wheel_gains[list(goal.critical_indices)] = section.wheel_gain
         travel = np.subtract(goal.wheels, self.problem.start.wheels)
-        return plan, swarm.Goal(np.array(goal.pose), np.array(section.pose_gains), travel, wheel_gains, section.period)
+        return plan, swarm.Goal(
+            np.array(goal.pose), np.array(section.pose_gains), travel, wheel_gains, section.period
+        )
 
     def evaluate(self, candidates: Array) -> Evaluation:
         candidates = np.asarray(candidates, dtype=np.float64)
         if self.is_affine:
             matrix, offset = self._affine_errors
             section = self.problem.objective
-            cost = section.wheel_gain * np.abs(folded(candidates @ matrix.T + offset, section.period)).sum(axis=1)
+            cost = section.wheel_gain * np.abs(
+                folded(candidates @ matrix.T + offset, section.period)
+            ).sum(axis=1)
             return Evaluation(cost, np.zeros(len(candidates)))
         if self._prescribed is not None and self._prescribed[0].fits(candidates):
             plan, goal = self._prescribed
@@ -232,23 +310,31 @@ class TerminalObjective:
 
     def terms(self, candidate: Array) -> dict[str, float]:
         """Named cost terms of one candidate (d,), without grid error."""
-        return {k: float(np.squeeze(v)) for k, v in self.named_terms(self.predict_exactly(candidate)).items()}
+        return {
+            k: float(np.squeeze(v))
+            for k, v in self.named_terms(self.predict_exactly(candidate)).items()
+        }
 
     def score(self, candidate: Array) -> Evaluation:
         return Evaluation(np.array([sum(self.terms(candidate).values())]), np.zeros(1))
 
-    # -- residuals ------------------------------------------------------------------------------------
+    # -- residuals
+    # ------------------------------------------------------------------------------------
 
     def nearest_turns(self, candidates: Array) -> Array:
-        """(n, c): for each critical wheel, the whole number of periods nearest to the predicted angle."""
+        """(n, c): for each critical wheel, the whole number of periods nearest to the predicted
+        angle."""
         errors = self.wheel_errors(self.predict(np.asarray(candidates, dtype=np.float64).T))
-        return np.stack([np.round(np.asarray(e)[0] / self.problem.objective.period) for e in errors], axis=1)
+        return np.stack(
+            [np.round(np.asarray(e)[0] / self.problem.objective.period) for e in errors], axis=1
+        )
 
     def residuals(self, z: Any, turns: Any, *, exact: bool = False) -> list[Any]:
-        """Pose errors, then critical wheel errors less ``turns`` (c,) periods; zero at an exact solution.
+        """Pose errors, then critical wheel errors less ``turns`` (c,) periods; zero at an exact
+        solution.
 
-        ``z`` is (d, n), or (d,) with ``exact``. Without actuator limits pose errors are zero identically and
-        are left out.
+        ``z`` is (d, n), or (d,) with ``exact``. Without actuator limits pose errors are zero
+        identically and are left out.
         """
         final = self.predict_exactly(z) if exact else self.predict(z)
         period = self.problem.objective.period
@@ -262,14 +348,18 @@ class TerminalObjective:
         return np.array(wheels if self.actuator.is_ideal else [*section.pose_gains, *wheels])
 
     def affine(self) -> tuple[Array, Array]:
-        """(c, d) matrix M and (c,) offset: critical wheel errors = M z + offset, without actuator limits.
+        """(c, d) matrix M and (c,) offset: critical wheel errors = M z + offset, without actuator
+        limits.
 
-        Exact because a prescribed heading makes every wheel's travel linear in the control points. Raises
-        ArgumentError when heading or duration are free or an actuator is switched on.
+        Exact because a prescribed heading makes every wheel's travel linear in the control points.
+        Raises ArgumentError when heading or duration are free or an actuator is switched on.
         """
         if not self.is_affine:
-            raise ArgumentError("spline.free", list(self.problem.spline.free),
-                                "p1 and p2 only, and no actuator, for affine wheel angles")
+            raise ArgumentError(
+                "spline.free",
+                list(self.problem.spline.free),
+                "p1 and p2 only, and no actuator, for affine wheel angles",
+            )
         part = self.affine_part()
         return part.matrix, part.offset
 
@@ -278,17 +368,28 @@ class TerminalObjective:
 
         Without p1 and p2 among the free values its matrix has no columns.
         """
-        variables = np.array([i for i, name in enumerate(self.names) if name.endswith(("x_m", "y_m"))], dtype=np.intp)
+        variables = np.array(
+            [i for i, name in enumerate(self.names) if name.endswith(("x_m", "y_m"))], dtype=np.intp
+        )
         probes = np.tile(self.default[:, None], variables.size + 1)
         probes[variables, 0] = 0.0
         probes[variables[:, None], np.arange(1, variables.size + 1)] = np.eye(variables.size)
         points = self.control_points(probes)
         travel = wheel_travel(step_grid(self.basis, 48), self.model, points.x, points.y, points.yaw)
-        ends = Terminal(points.x[-1:], points.y[-1:], points.yaw[-1:],
-                        tuple(q.sum(axis=0, keepdims=True) for q in travel))
+        ends = Terminal(
+            points.x[-1:],
+            points.y[-1:],
+            points.yaw[-1:],
+            tuple(q.sum(axis=0, keepdims=True) for q in travel),
+        )
         errors = np.vstack([np.asarray(e) for e in self.wheel_errors(ends)])
-        return AffinePart(errors[:, 1:] - errors[:, :1], errors[:, 0], self.problem.objective.period, variables,
-                          self.default)
+        return AffinePart(
+            errors[:, 1:] - errors[:, :1],
+            errors[:, 0],
+            self.problem.objective.period,
+            variables,
+            self.default,
+        )
 
     def gradient(self, candidate: Array) -> Array:
         """(d,): gradient of the cost where affine (a subgradient at its kinks)."""
@@ -297,11 +398,13 @@ class TerminalObjective:
         return np.asarray(self.problem.objective.wheel_gain * np.sign(deviation) @ matrix)
 
     def coarse(self) -> TerminalObjective:
-        """The same objective on a third of the grid, for Newton steps that are made exact afterwards."""
+        """The same objective on a third of the grid, for Newton steps that are made exact
+        afterwards."""
         return replace(self, steps=COARSE_STEPS)
 
     def effort(self, candidates: Array) -> Array:
-        """(n,): the fastest wheel's peak rate per unit of spline parameter; ranks exact solutions."""
+        """(n,): the fastest wheel's peak rate per unit of spline parameter; ranks exact
+        solutions."""
         points = self.control_points(np.asarray(candidates, dtype=np.float64).T)
         grid = step_grid(self.basis, 24)
         travel = wheel_travel(grid, self.model, points.x, points.y, points.yaw)
@@ -310,8 +413,8 @@ class TerminalObjective:
     def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:
         """Table 4.4 as a smooth program, whole turns fixed by ``parameters`` (c, 1).
 
-        ``z`` (d + m, 1) holds the decision variables and one slack a residual: minimise gains . slack
-        subject to slack - r >= 0 and slack + r >= 0, so that slack = |r| at the optimum.
+        ``z`` (d + m, 1) holds the decision variables and one slack a residual: minimise gains .
+        slack subject to slack - r >= 0 and slack + r >= 0, so that slack = |r| at the optimum.
         """
         turns = [parameters[i : i + 1] for i in range(len(self.problem.goal.critical))]
         r = self.residuals(z[: self.dimension], turns)
@@ -319,8 +422,14 @@ class TerminalObjective:
         cost: Any = 0.0
         for gain, value in zip(self.residual_gains().tolist(), slack, strict=True):
             cost = cost + gain * value
-        rows = [row for value, error in zip(slack, r, strict=True) for row in (value - error, value + error)]
-        return SymbolicProblem(cost, np.vstack(rows), np.zeros(len(rows)), np.full(len(rows), np.inf))
+        rows = [
+            row
+            for value, error in zip(slack, r, strict=True)
+            for row in (value - error, value + error)
+        ]
+        return SymbolicProblem(
+            cost, np.vstack(rows), np.zeros(len(rows)), np.full(len(rows), np.inf)
+        )
 
     def parameters_at(self, start: Array) -> Array:
         return np.asarray(self.nearest_turns(start[None])[0])
@@ -341,11 +450,18 @@ def folded(angle: Any, period: float) -> Any:
     return angle - period * np.floor(angle / period + 0.5)
 
 
-def terminal_cost(pose_deviation: Array, wheel_deviation: Array, pose_gains: Array, wheel_gains: Array,
-                  period: float = 2 * np.pi) -> float:
+def terminal_cost(
+    pose_deviation: Array,
+    wheel_deviation: Array,
+    pose_gains: Array,
+    wheel_gains: Array,
+    period: float = 2 * np.pi,
+) -> float:
     """Table 4.4 from deviations alone: pose (3,), wheels (4,), with gains (3,) and (4,)."""
-    return float(np.dot(pose_gains, np.abs(pose_deviation))
-                 + np.dot(wheel_gains, np.abs(folded(np.asarray(wheel_deviation), period))))
+    return float(
+        np.dot(pose_gains, np.abs(pose_deviation))
+        + np.dot(wheel_gains, np.abs(folded(np.asarray(wheel_deviation), period)))
+    )
 
 
 def terminal_objective(problem: Problem, *, steps: int = SEARCH_STEPS) -> TerminalObjective:

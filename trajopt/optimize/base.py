@@ -1,9 +1,10 @@
 """The contract every optimizer fulfils, and the recorder that enforces it.
 
-An optimizer is a frozen dataclass of options with one method, ``minimize``. It never touches the objective
-itself, only through a ``Run``, which keeps every optimizer to the same bounds, budget and bookkeeping: it
-counts evaluations, keeps the history and the best candidate (Deb's feasibility rule), treats an objective
-that raises or returns NaN as infeasible, and ends the search when the budget is used up.
+An optimizer is a frozen dataclass of options with one method, ``minimize``. It never touches the
+objective itself, only through a ``Run``, which keeps every optimizer to the same bounds, budget and
+bookkeeping: it counts evaluations, keeps the history and the best candidate (Deb's feasibility
+rule), treats an objective that raises or returns NaN as infeasible, and ends the search when the
+budget is used up.
 """
 
 from __future__ import annotations
@@ -47,10 +48,11 @@ class Status(Enum):
 
 @dataclass(frozen=True)
 class Budget:
-    """What a search may use: objective ``evaluations``, ``seconds``, and a cost ``target`` that ends it.
+    """What a search may use: objective ``evaluations``, ``seconds``, and a cost ``target`` that
+    ends it.
 
-    ``clock`` says which seconds, also in histories and results: "wall", or "cpu" for processor time of this
-    process, which other load on the machine does not change.
+    ``clock`` says which seconds, also in histories and results: "wall", or "cpu" for processor time
+    of this process, which other load on the machine does not change.
     """
 
     evaluations: int | None = DEFAULT_EVALUATIONS
@@ -59,9 +61,13 @@ class Budget:
     clock: Literal["wall", "cpu"] = "wall"
 
     def __post_init__(self) -> None:
-        whole = isinstance(self.evaluations, (int, np.integer)) and not isinstance(self.evaluations, bool)
+        whole = isinstance(self.evaluations, (int, np.integer)) and not isinstance(
+            self.evaluations, bool
+        )
         if self.evaluations is not None and not (whole and self.evaluations >= 1):
-            raise ArgumentError("budget.evaluations", self.evaluations, "a whole number >= 1, or None")
+            raise ArgumentError(
+                "budget.evaluations", self.evaluations, "a whole number >= 1, or None"
+            )
         if self.seconds is not None and not (_is_real(self.seconds) and 0 < self.seconds < np.inf):
             raise ArgumentError("budget.seconds", self.seconds, "a finite time > 0 s, or None")
         if self.target is not None and not (_is_real(self.target) and not np.isnan(self.target)):
@@ -90,12 +96,12 @@ class History:
 class OptimizeResult:
     """Outcome of a search, in SciPy's names.
 
-    ``fun`` and ``violation`` are recomputed by the objective at ``x`` after the search, more finely than the
-    search saw it where the objective can (``search_fun`` is what the search saw). ``failures`` counts
-    evaluations that raised or were not finite; ``first_failure`` says what the first one was. ``ngev`` counts
-    exact gradients and ``nhev`` exact Hessians, which are not among ``nfev`` (finite differences are).
-    ``seconds`` are those of the budget's clock, without ``construct_seconds``: what it took before to write a
-    program in symbols, say.
+    ``fun`` and ``violation`` are recomputed by the objective at ``x`` after the search, more finely
+    than the search saw it where the objective can (``search_fun`` is what the search saw).
+    ``failures`` counts evaluations that raised or were not finite; ``first_failure`` says what the
+    first one was. ``ngev`` counts exact gradients and ``nhev`` exact Hessians, which are not among
+    ``nfev`` (finite differences are). ``seconds`` are those of the budget's clock, without
+    ``construct_seconds``: what it took before to write a program in symbols, say.
     """
 
     x: Array
@@ -118,14 +124,23 @@ class OptimizeResult:
 
 
 class Optimizer(Protocol):
-    """A search method. ``needs`` lists what it asks of an objective; ``stochastic`` whether seeds matter."""
+    """A search method. ``needs`` lists what it asks of an objective; ``stochastic`` whether seeds
+    matter."""
 
     name: ClassVar[str]
     needs: ClassVar[frozenset[Capability]]
     stochastic: ClassVar[bool]
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult: ...
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult: ...
 
 
 class _Stop(Exception):
@@ -135,7 +150,8 @@ class _Stop(Exception):
 
 @dataclass
 class Run:
-    """One search: the only way from an optimizer to its objective. Mutable by nature; lives for one search."""
+    """One search: the only way from an optimizer to its objective. Mutable by nature; lives for one
+    search."""
 
     objective: Objective
     bounds: Array
@@ -160,13 +176,15 @@ class Run:
     def __post_init__(self) -> None:
         self._started = self._now()
 
-    # -- evaluating -----------------------------------------------------------------------------------
+    # -- evaluating
+    # -----------------------------------------------------------------------------------
 
     def evaluate(self, candidates: Array, *, inside: bool = False) -> Evaluation:
-        """Cost and violation of candidates (n, d); the distance outside the bounds adds to the violation.
+        """Cost and violation of candidates (n, d); the distance outside the bounds adds to the
+        violation.
 
-        ``inside`` says that all are within the bounds, which saves looking. Ends the search (by an exception the
-        run catches itself) when the budget is used up or the target met.
+        ``inside`` says that all are within the bounds, which saves looking. Ends the search (by an
+        exception the run catches itself) when the budget is used up or the target met.
         """
         candidates = np.ascontiguousarray(candidates, dtype=np.float64)
         wanted = len(candidates)
@@ -180,7 +198,11 @@ class Run:
             outside = np.maximum(low - candidates, candidates - high)
             violation = violation + np.maximum(outside, 0.0).sum(axis=1)
         self._record(candidates, result.cost, violation)
-        if self.budget.target is not None and self.best_violation <= FEASIBLE and self.best_cost <= self.budget.target:
+        if (
+            self.budget.target is not None
+            and self.best_violation <= FEASIBLE
+            and self.best_cost <= self.budget.target
+        ):
             self.stop(Status.TARGET)
         if len(candidates) < wanted:
             self.stop(Status.EVALUATIONS)
@@ -193,31 +215,46 @@ class Run:
         return float(self.evaluate(np.asarray(candidate, dtype=np.float64)[None]).cost[0])
 
     def _guarded(self, candidates: Array) -> Evaluation:
-        """The objective's answer, with everything that is not a finite number turned into "infeasible"."""
+        """The objective's answer, with everything that is not a finite number turned into
+        "infeasible"."""
         try:
             result = self.objective.evaluate(candidates.copy())
             cost = np.array(result.cost, dtype=np.float64)
             violation = np.array(result.violation, dtype=np.float64)
             if cost.shape != (len(candidates),) or violation.shape != cost.shape:
-                raise ValueError(f"objective returned shape {cost.shape} for {len(candidates)} candidates")
+                raise ValueError(
+                    f"objective returned shape {cost.shape} for {len(candidates)} candidates"
+                )
         except (KeyboardInterrupt, SystemExit, _Stop):
             raise
         except Exception as error:  # whatever a user's objective raises counts as infeasible
             if len(candidates) > 1:
                 parts = [self._guarded(row[None]) for row in candidates]
-                return Evaluation(np.concatenate([p.cost for p in parts]),
-                                  np.concatenate([p.violation for p in parts]))
-            return self._failed(np.full(1, np.inf), np.full(1, np.inf), np.ones(1, bool),
-                                f"{type(error).__name__}: {error}")
-        if math.isfinite(np.add.reduce(cost) + np.add.reduce(violation)):  # then each is; the usual case, quick
+                return Evaluation(
+                    np.concatenate([p.cost for p in parts]),
+                    np.concatenate([p.violation for p in parts]),
+                )
+            return self._failed(
+                np.full(1, np.inf),
+                np.full(1, np.inf),
+                np.ones(1, bool),
+                f"{type(error).__name__}: {error}",
+            )
+        if math.isfinite(
+            np.add.reduce(cost) + np.add.reduce(violation)
+        ):  # then each is; the usual case, quick
             return Evaluation(cost, violation)
         bad = ~(np.isfinite(cost) & np.isfinite(violation))
         if bad.any():
             worst = cost[np.argmax(bad)]
-            return self._failed(cost, violation, bad, f"cost {worst} at {candidates[np.argmax(bad)].tolist()}")
+            return self._failed(
+                cost, violation, bad, f"cost {worst} at {candidates[np.argmax(bad)].tolist()}"
+            )
         return Evaluation(cost, violation)
 
-    def _failed(self, cost: Array, violation: Array, bad: NDArray[np.bool_], reason: str) -> Evaluation:
+    def _failed(
+        self, cost: Array, violation: Array, bad: NDArray[np.bool_], reason: str
+    ) -> Evaluation:
         self.failures += int(bad.sum())
         self.first_failure = self.first_failure or reason
         return Evaluation(np.where(bad, np.inf, cost), np.where(bad, np.inf, violation))
@@ -238,7 +275,8 @@ class Run:
             self.on_progress(self.nfev, self.best_cost)
 
     def spend(self, evaluations: int) -> None:
-        """Count work on the objective that does not go through ``evaluate`` (residuals), before it is done.
+        """Count work on the objective that does not go through ``evaluate`` (residuals), before it
+        is done.
 
         Ends the search where the budget does not hold it.
         """
@@ -249,11 +287,13 @@ class Run:
             self.stop(Status.SECONDS)
 
     def propose(self, candidate: Array) -> None:
-        """Enter a candidate (d,) into the final judgement, whatever its cost on the search grid is."""
+        """Enter a candidate (d,) into the final judgement, whatever its cost on the search grid
+        is."""
         self._proposals.append(np.clip(candidate, self.bounds[:, 0], self.bounds[:, 1]))
 
     def constructed(self) -> None:
-        """Start the clock anew: what went before was construction, which is told apart from the search."""
+        """Start the clock anew: what went before was construction, which is told apart from the
+        search."""
         self.construct_seconds = self.elapsed
         self._started = self._now()
 
@@ -275,7 +315,11 @@ class Run:
 
     def _judged(self) -> tuple[Array, float, float]:
         """The best candidate by the objective's own fine score, with its cost and violation."""
-        found = [] if self.best_x is None else [np.clip(self.best_x, self.bounds[:, 0], self.bounds[:, 1])]
+        found = (
+            []
+            if self.best_x is None
+            else [np.clip(self.best_x, self.bounds[:, 0], self.bounds[:, 1])]
+        )
         best = (self.bounds.mean(axis=1), np.inf, np.inf)
         for x in [*found, *self._proposals]:
             try:
@@ -288,7 +332,8 @@ class Run:
                 best = (x, float(scored.cost[0]), float(scored.violation[0]))
         return best
 
-    # -- finishing ------------------------------------------------------------------------------------
+    # -- finishing
+    # ------------------------------------------------------------------------------------
 
     def finish(self, optimizer: str, search: Callable[[], tuple[Status, str]]) -> OptimizeResult:
         """Run ``search`` to its end or the budget's, then judge the best candidate anew."""
@@ -305,12 +350,32 @@ class Run:
         if self.failures:
             text += f" ({self.failures} evaluations failed; the first: {self.first_failure})"
         rows = np.array(self._rows, dtype=np.float64).reshape(-1, 4)
-        history = History(rows[:, 0].astype(np.int64), rows[:, 1], rows[:, 2], rows[:, 3],
-                          np.concatenate(self._samples) if self._samples else np.zeros((0, len(self.bounds))))
+        history = History(
+            rows[:, 0].astype(np.int64),
+            rows[:, 1],
+            rows[:, 2],
+            rows[:, 3],
+            np.concatenate(self._samples) if self._samples else np.zeros((0, len(self.bounds))),
+        )
         return OptimizeResult(
-            x, fun, violation, self.best_cost, self.nfev, self.nit, status in (Status.TARGET, Status.CONVERGED),
-            status, text, optimizer, history, self.elapsed, self.failures, self.first_failure, self.ngev,
-            self.nhev, self.construct_seconds)
+            x,
+            fun,
+            violation,
+            self.best_cost,
+            self.nfev,
+            self.nit,
+            status in (Status.TARGET, Status.CONVERGED),
+            status,
+            text,
+            optimizer,
+            history,
+            self.elapsed,
+            self.failures,
+            self.first_failure,
+            self.ngev,
+            self.nhev,
+            self.construct_seconds,
+        )
 
 
 @dataclass
@@ -340,7 +405,8 @@ class Starts:
 
 
 def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:
-    """Deb's feasibility rule: feasible before infeasible, then the cost, or else the violation, decides."""
+    """Deb's feasibility rule: feasible before infeasible, then the cost, or else the violation,
+    decides."""
     feasible, than_feasible = violation <= FEASIBLE, than_violation <= FEASIBLE
     if feasible and than_feasible:
         return bool(cost < than_cost)
@@ -361,9 +427,13 @@ def best_index(cost: Array, violation: Array) -> int:
 
 def checked_bounds(bounds: ArrayLike, dimension: int | None = None) -> Array:
     """(d, 2) array of finite bounds, lower < upper. Raises ArgumentError otherwise."""
-    array = as_numbers("bounds", bounds, "a lower and an upper bound a variable: numbers of shape (d, 2)")
+    array = as_numbers(
+        "bounds", bounds, "a lower and an upper bound a variable: numbers of shape (d, 2)"
+    )
     if array.ndim != 2 or array.shape[1] != 2 or array.shape[0] < 1:
-        raise ArgumentError("bounds", array.shape, "shape (d, 2): a lower and an upper bound a variable")
+        raise ArgumentError(
+            "bounds", array.shape, "shape (d, 2): a lower and an upper bound a variable"
+        )
     if not np.all(np.isfinite(array)) or np.any(array[:, 0] >= array[:, 1]):
         raise ArgumentError("bounds", array.tolist(), "finite bounds, each lower < upper")
     if dimension is not None and len(array) != dimension:

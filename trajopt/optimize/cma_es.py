@@ -1,4 +1,5 @@
-"""CMA-ES by the package pycma, behind the package's contract. Constraints by Deb's rule as a rank."""
+"""CMA-ES by the package pycma, behind the package's contract. Constraints by Deb's rule as a
+rank."""
 
 from __future__ import annotations
 
@@ -11,14 +12,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import FEASIBLE, Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import (
+    FEASIBLE,
+    Budget,
+    OptimizeResult,
+    Progress,
+    Run,
+    Status,
+    checked_bounds,
+    checked_x0,
+)
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class CmaEs:
-    """Covariance matrix adaptation, restarted with twice the population when it has converged (IPOP).
+    """Covariance matrix adaptation, restarted with twice the population when it has converged
+    (IPOP).
 
     Works on variables scaled to [0, 1]; pycma's own bound handling keeps candidates inside.
     """
@@ -30,8 +41,16 @@ class CmaEs:
     sigma: float = 0.3  # of the width; pycma's documentation: about a quarter of the search range
     restarts: int = 9  # pycma's documentation of IPOP
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
         """Search. Raises MissingDependencyError without pycma."""
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
@@ -39,7 +58,9 @@ class CmaEs:
         package = _package()
         return run.finish(self.name, lambda: self._search(package, run, start, rng))
 
-    def _search(self, package: Any, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+    def _search(
+        self, package: Any, run: Run, x0: Array | None, rng: Generator
+    ) -> tuple[Status, str]:
         low, width = run.bounds[:, 0], run.bounds[:, 1] - run.bounds[:, 0]
         d = len(low)
         if x0 is not None:  # pycma samples around its start without evaluating it
@@ -47,8 +68,15 @@ class CmaEs:
         population = 4 + int(3 * np.log(d))  # pycma's default
         for restart in range(self.restarts + 1):
             first = rng.random(d) if x0 is None or restart else (x0 - low) / width
-            options = {"bounds": [0.0, 1.0], "popsize": population << restart, "verbose": -9, "verb_log": 0,
-                       "verb_disp": 0, "seed": np.nan, "randn": lambda *shape: rng.standard_normal(shape)}
+            options = {
+                "bounds": [0.0, 1.0],
+                "popsize": population << restart,
+                "verbose": -9,
+                "verb_log": 0,
+                "verb_disp": 0,
+                "seed": np.nan,
+                "randn": lambda *shape: rng.standard_normal(shape),
+            }
             strategy = package.CMAEvolutionStrategy(first, self.sigma, options)
             while not strategy.stop():
                 asked = np.asarray(strategy.ask())
@@ -59,7 +87,8 @@ class CmaEs:
 
 
 def _ranked(cost: Array, violation: Array) -> Array:
-    """Costs where all are feasible and finite; otherwise ranks by Deb's rule (CMA-ES uses ranks only)."""
+    """Costs where all are feasible and finite; otherwise ranks by Deb's rule (CMA-ES uses ranks
+    only)."""
     if np.all(violation <= FEASIBLE) and np.all(np.isfinite(cost)):
         return cost
     order = np.lexsort((cost, np.where(violation <= FEASIBLE, 0.0, violation)))

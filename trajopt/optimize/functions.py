@@ -17,7 +17,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FunctionObjective:
-    """``function`` of d variables: one candidate (d,) -> number, or, with ``batch``, (n, d) -> (n,)."""
+    """``function`` of d variables: one candidate (d,) -> number, or, with ``batch``, (n, d) ->
+    (n,)."""
 
     function: Callable[[Any], Any]
     dimension: int
@@ -25,7 +26,8 @@ class FunctionObjective:
 
     @property
     def provides(self) -> frozenset[Capability]:
-        # A scalar function may also run on symbols; the symbolic optimizer finds out and says so if not.
+        # A scalar function may also run on symbols; the symbolic optimizer finds out and says so if
+        # not.
         return frozenset({Capability.BATCH} if self.batch else {Capability.SYMBOLIC})
 
     def evaluate(self, candidates: Array) -> Evaluation:
@@ -56,14 +58,16 @@ class FunctionObjective:
 def as_objective(objective: Objective | Callable[[Any], Any], bounds: Array) -> Objective:
     """The objective itself, or a plain function wrapped as one.
 
-    A function counts as a batch function when it maps three different points (3, d) to three numbers (3,)
-    that agree with what it gives for single points, or when it cannot take single points at all.
-    Raises ArgumentError for what cannot be called.
+    A function counts as a batch function when it maps three different points (3, d) to three
+    numbers (3,) that agree with what it gives for single points, or when it cannot take single
+    points at all. Raises ArgumentError for what cannot be called.
     """
     if isinstance(objective, Objective):
         return objective
     if not callable(objective):
-        raise ArgumentError("objective", objective, "an objective (objectives.base.Objective) or a function")
+        raise ArgumentError(
+            "objective", objective, "an objective (objectives.base.Objective) or a function"
+        )
     d = len(bounds)
     return FunctionObjective(objective, d, batch=_is_batch(objective, bounds))
 
@@ -89,5 +93,7 @@ def _number(value: Any) -> float:
         raise ValueError(f"the objective returned the complex number {value}; expected a real one")
     array = np.asarray(value, dtype=np.float64)
     if array.size != 1:
-        raise ValueError(f"the objective returned shape {array.shape} for one candidate; expected a number")
+        raise ValueError(
+            f"the objective returned shape {array.shape} for one candidate; expected a number"
+        )
     return float(array.reshape(()))

@@ -10,7 +10,15 @@ from numpy.typing import ArrayLike
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import (
+    Budget,
+    OptimizeResult,
+    Progress,
+    Run,
+    Status,
+    checked_bounds,
+    checked_x0,
+)
 
 
 @dataclass(frozen=True)
@@ -21,13 +29,24 @@ class Given:
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = False
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:  # noqa: ARG002
-        """The result at ``x0`` (d,). Raises ArgumentError without one, or for one outside the bounds."""
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,  # noqa: ARG002 - the contract has it
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
+        """The result at ``x0`` (d,). Raises ArgumentError without one, or for one outside the
+        bounds."""
         box = checked_bounds(bounds, objective.dimension)
         point = checked_x0(x0, box)
         if point is None:
-            raise ArgumentError("x0", None, f"the candidate to judge, {objective.dimension} numbers")
+            raise ArgumentError(
+                "x0", None, f"the candidate to judge, {objective.dimension} numbers"
+            )
         run = Run(objective, box, budget, progress)
 
         def judged() -> tuple[Status, str]:

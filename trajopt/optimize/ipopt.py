@@ -1,9 +1,11 @@
-"""CasADi and IPOPT behind the package's contract: exact first and second derivatives of the same formulas.
+"""CasADi and IPOPT behind the package's contract: exact first and second derivatives of the same
+formulas.
 
-The objective's NumPy formulas run on CasADi symbols (CasADi's NumPy mode), so physics exists once. Whole
-turns are parameters of the program, fixed at each start to the nearest ones; starts are lattice points where
-the objective has a lattice, then x0, then seeded random points. A Newton polish on the residuals makes the
-result exact where the objective has residuals. The only module that imports casadi.
+The objective's NumPy formulas run on CasADi symbols (CasADi's NumPy mode), so physics exists once.
+Whole turns are parameters of the program, fixed at each start to the nearest ones; starts are
+lattice points where the objective has a lattice, then x0, then seeded random points. A Newton
+polish on the residuals makes the result exact where the objective has residuals. The only module
+that imports casadi.
 """
 
 from __future__ import annotations
@@ -26,7 +28,16 @@ from trajopt.objectives.base import (
     SymbolicObjective,
     SymbolicProblem,
 )
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Starts, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import (
+    Budget,
+    OptimizeResult,
+    Progress,
+    Run,
+    Starts,
+    Status,
+    checked_bounds,
+    checked_x0,
+)
 from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
 from trajopt.optimize.newton import solve_residuals
 
@@ -38,8 +49,8 @@ class Ipopt:
     """IPOPT from several starts.
 
     ``starts``: number of starts in all. ``lattice_starts``: how many of them may be lattice points.
-    ``polish``: Newton on the residuals after each start. ``stop_when_exact``: skip the remaining starts once
-    the cost is below 1e-9. ``tolerance``: IPOPT's tol.
+    ``polish``: Newton on the residuals after each start. ``stop_when_exact``: skip the remaining
+    starts once the cost is below 1e-9. ``tolerance``: IPOPT's tol.
     """
 
     name: ClassVar[str] = "ipopt"
@@ -53,11 +64,19 @@ class Ipopt:
     polish: bool = True
     stop_when_exact: bool = True
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Search. ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the history, and
-        the polish; ``ngev`` and ``nhev`` count its gradients and Hessians. Raises ArgumentError when the objective
-        cannot be written in symbols."""
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
+        """Search. ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the
+        history, and the polish; ``ngev`` and ``nhev`` count its gradients and Hessians. Raises
+        ArgumentError when the objective cannot be written in symbols."""
         box = checked_bounds(bounds, objective.dimension)
         start = checked_x0(x0, box)
         run = Run(objective, box, budget, progress)
@@ -65,7 +84,9 @@ class Ipopt:
         run.constructed()
         return run.finish(self.name, lambda: self._search(run, program, start, rng))
 
-    def _search(self, run: Run, program: _Program, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+    def _search(
+        self, run: Run, program: _Program, x0: Array | None, rng: Generator
+    ) -> tuple[Status, str]:
         residual = Capability.RESIDUALS in run.objective.provides
         successes, starts = 0, Starts(run)
         for start in self._starts(run, x0, rng):
@@ -88,7 +109,8 @@ class Ipopt:
         return status, f"{successes} of {starts.tried} starts exact"
 
     def _starts(self, run: Run, x0: Array | None, rng: Generator) -> list[Array]:
-        """Lattice points by peak wheel rate, then x0 or the middle of the bounds, then random points."""
+        """Lattice points by peak wheel rate, then x0 or the middle of the bounds, then random
+        points."""
         found: list[Array] = []
         if self.lattice_starts and hasattr(run.objective, "affine_part"):
             objective = cast(LatticeObjective, run.objective)
@@ -101,7 +123,9 @@ class Ipopt:
             if len(points):
                 order = np.argsort(objective.effort(candidates), kind="stable")
                 found = list(candidates[order][: self.lattice_starts])
-        found.insert(0 if x0 is not None else len(found), run.bounds.mean(axis=1) if x0 is None else x0)
+        found.insert(
+            0 if x0 is not None else len(found), run.bounds.mean(axis=1) if x0 is None else x0
+        )
         while len(found) < self.starts:
             found.append(rng.uniform(run.bounds[:, 0], run.bounds[:, 1]))
         return found[: self.starts]
@@ -132,16 +156,28 @@ class _Program:
         constraints = ca.MX(0, 1) if problem.constraints is None else ca.MX(problem.constraints)
         watch = _watcher(ca, run, z.numel(), constraints.numel(), p.numel())
         settings: dict[str, Any] = {
-            "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": options.tolerance,
-            "ipopt.max_iter": options.max_iterations, "iteration_callback": watch,
-            "ipopt.bound_relax_factor": 0.0, "error_on_fail": False,
+            "print_time": False,
+            "ipopt.print_level": 0,
+            "ipopt.sb": "yes",
+            "ipopt.tol": options.tolerance,
+            "ipopt.max_iter": options.max_iterations,
+            "iteration_callback": watch,
+            "ipopt.bound_relax_factor": 0.0,
+            "error_on_fail": False,
         }
         if run.budget.seconds is not None:
             clock = "ipopt.max_wall_time" if run.budget.clock == "wall" else "ipopt.max_cpu_time"
             settings[clock] = run.budget.seconds
         nlp = {"x": z, "f": ca.MX(problem.cost), "g": constraints, "p": p}
-        return cls(run, objective, ca.nlpsol("trajopt", "ipopt", nlp, settings), len(slacks),
-                   problem.lower, problem.upper, watch)
+        return cls(
+            run,
+            objective,
+            ca.nlpsol("trajopt", "ipopt", nlp, settings),
+            len(slacks),
+            problem.lower,
+            problem.upper,
+            watch,
+        )
 
     def solve(self, start: Array) -> Array:
         """The decision variables (d,) where IPOPT ended from ``start`` (d,)."""
@@ -149,10 +185,13 @@ class _Program:
         d = len(start)
         self.watch.seen = 0
         solution = self.solver(
-            x0=np.concatenate([start, slacks]), p=self.objective.parameters_at(start),
+            x0=np.concatenate([start, slacks]),
+            p=self.objective.parameters_at(start),
             lbx=np.concatenate([self.run.bounds[:, 0], np.zeros(self.slacks)]),
             ubx=np.concatenate([self.run.bounds[:, 1], np.full(self.slacks, np.inf)]),
-            lbg=self.lower, ubg=self.upper)
+            lbg=self.lower,
+            ubg=self.upper,
+        )
         stats = self.solver.stats()
         self.run.nit += int(stats["iter_count"])
         # IPOPT's own calls beyond the one an iterate that the watch has counted: line searches.
@@ -161,7 +200,9 @@ class _Program:
         self.run.nhev += int(stats.get("n_call_nlp_hess_l", 0))
         if self.watch.stopped is not None:
             self.run.stop(self.watch.stopped)
-        x = np.clip(np.asarray(solution["x"]).ravel()[:d], self.run.bounds[:, 0], self.run.bounds[:, 1])
+        x = np.clip(
+            np.asarray(solution["x"]).ravel()[:d], self.run.bounds[:, 0], self.run.bounds[:, 1]
+        )
         if not np.all(np.isfinite(x)):
             return start
         self.run.evaluate(x[None])
@@ -173,18 +214,24 @@ def _in_symbols(objective: SymbolicObjective, z: Any, p: Any) -> SymbolicProblem
         with numpy_on_symbols(True):
             return objective.symbolic(z, p)
     except Exception as error:  # whatever a user's function raises on symbols
-        raise ArgumentError("objective", f"{type(error).__name__}: {error}", "a function written with NumPy "
-                            "functions and arithmetic on its components, so that it runs on CasADi symbols; "
-                            "take slsqp or pso otherwise") from error
+        raise ArgumentError(
+            "objective",
+            f"{type(error).__name__}: {error}",
+            "a function written with NumPy "
+            "functions and arithmetic on its components, so that it runs on CasADi symbols; "
+            "take slsqp or pso otherwise",
+        ) from error
 
 
 @contextmanager
 def numpy_on_symbols(on: bool) -> Iterator[None]:
-    """Whether NumPy's functions and shapes hold for symbols inside the block (or the function, as a decorator).
+    """Whether NumPy's functions and shapes hold for symbols inside the block (or the function, as a
+    decorator).
 
-    On: ``np.sin(x)`` runs on symbols, and vectors have NumPy's one dimension. Off: vectors are columns, and a
-    NumPy vector times a column of symbols goes element by element, as the programs of this package are written.
-    CasADi's switch is global, so each block sets what it needs and gives back what it found.
+    On: ``np.sin(x)`` runs on symbols, and vectors have NumPy's one dimension. Off: vectors are
+    columns, and a NumPy vector times a column of symbols goes element by element, as the programs
+    of this package are written. CasADi's switch is global, so each block sets what it needs and
+    gives back what it found.
     """
     import casadi as ca
 
@@ -197,7 +244,8 @@ def numpy_on_symbols(on: bool) -> Iterator[None]:
 
 
 def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
-    """A CasADi callback that records each iterate in the run and stops IPOPT when the budget is used up."""
+    """A CasADi callback that records each iterate in the run and stops IPOPT when the budget is
+    used up."""
     d = run.objective.dimension
 
     class Watch(ca.Callback):  # type: ignore[misc]
@@ -223,7 +271,9 @@ def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
                 run.spend(1)  # IPOPT's own call
                 self.seen += 1
                 run.evaluate(np.clip(x, run.bounds[:, 0], run.bounds[:, 1])[None])
-            except Exception as stop:  # exceptions cannot cross CasADi: remember, and ask IPOPT to end
+            except (
+                Exception
+            ) as stop:  # exceptions cannot cross CasADi: remember, and ask IPOPT to end
                 self.stopped = getattr(stop, "status", Status.FAILED)
                 return [1]
             return [0]
@@ -233,7 +283,8 @@ def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class ProgramResult:
-    """What IPOPT found: ``x`` (n,), ``cost``, ``solved`` (to its tolerance), its own ``status`` and iterations."""
+    """What IPOPT found: ``x`` (n,), ``cost``, ``solved`` (to its tolerance), its own ``status`` and
+    iterations."""
 
     x: Array
     cost: float
@@ -274,25 +325,49 @@ def smooth_table(grid: Array, values: Array) -> Callable[[Any], Any]:
     """Cubic B-spline through ``values`` (N, K) on ``grid`` (N,): expressions (1, M) -> (K, M)."""
     import casadi as ca
 
-    table = ca.interpolant("table", "bspline", [grid.tolist()], np.ascontiguousarray(values).ravel().tolist())
+    table = ca.interpolant(
+        "table", "bspline", [grid.tolist()], np.ascontiguousarray(values).ravel().tolist()
+    )
     return lambda at: table.map(at.shape[1])(at)
 
 
-def solve_program(x: Any, cost: Any, constraints: Any, *, start: Array, lower: Array, upper: Array,
-                  constraint_lower: Array, constraint_upper: Array, tolerance: float = 1e-8,
-                  max_iterations: int = 300) -> ProgramResult:
-    """Minimise ``cost`` over the symbols ``x`` (n,) between bounds, with constraints between theirs, by IPOPT.
+def solve_program(
+    x: Any,
+    cost: Any,
+    constraints: Any,
+    *,
+    start: Array,
+    lower: Array,
+    upper: Array,
+    constraint_lower: Array,
+    constraint_upper: Array,
+    tolerance: float = 1e-8,
+    max_iterations: int = 300,
+) -> ProgramResult:
+    """Minimise ``cost`` over the symbols ``x`` (n,) between bounds, with constraints between
+    theirs, by IPOPT.
 
-    Expressions come from ``variables``, ``stacked`` and ``smooth_table``. Warm start: ``start`` (n,).
+    Expressions come from ``variables``, ``stacked`` and ``smooth_table``. Warm start: ``start``
+    (n,).
     """
     import casadi as ca
 
     settings: dict[str, Any] = {
-        "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.tol": tolerance,
-        "ipopt.max_iter": max_iterations, "ipopt.mu_strategy": "adaptive", "error_on_fail": False,
+        "print_time": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.tol": tolerance,
+        "ipopt.max_iter": max_iterations,
+        "ipopt.mu_strategy": "adaptive",
+        "error_on_fail": False,
     }
     solver = ca.nlpsol("program", "ipopt", {"x": x, "f": cost, "g": constraints}, settings)
     found = solver(x0=start, lbx=lower, ubx=upper, lbg=constraint_lower, ubg=constraint_upper)
     stats = solver.stats()
-    return ProgramResult(np.asarray(found["x"], dtype=np.float64).ravel(), float(found["f"]),
-                         bool(stats["success"]), str(stats["return_status"]), int(stats["iter_count"]))
+    return ProgramResult(
+        np.asarray(found["x"], dtype=np.float64).ravel(),
+        float(found["f"]),
+        bool(stats["success"]),
+        str(stats["return_status"]),
+        int(stats["iter_count"]),
+    )

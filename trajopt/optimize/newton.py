@@ -1,8 +1,9 @@
 """Damped minimum-norm Newton on residuals, inside bounds: the polish that makes a solution exact.
 
-Each step solves J dz = -r in the least-squares, minimum-norm sense in variables scaled by the box; variables
-that would leave the box are held at it and the step is solved again for the others. With more unknowns than
-residuals the solution nearest to the start is approached; with fewer it is Gauss-Newton.
+Each step solves J dz = -r in the least-squares, minimum-norm sense in variables scaled by the box;
+variables that would leave the box are held at it and the step is solved again for the others. With
+more unknowns than residuals the solution nearest to the start is approached; with fewer it is
+Gauss-Newton.
 """
 
 from __future__ import annotations
@@ -31,12 +32,14 @@ class NewtonOutcome:
     solved: bool
 
 
-def solve_residuals(run: Run, objective: ResidualObjective, start: Array, turns: Array, *,
-                    iterations: int = 25) -> NewtonOutcome:
-    """Newton from ``start`` (d,) with whole ``turns`` (c,) fixed: on a coarse grid first, then exactly.
+def solve_residuals(
+    run: Run, objective: ResidualObjective, start: Array, turns: Array, *, iterations: int = 25
+) -> NewtonOutcome:
+    """Newton from ``start`` (d,) with whole ``turns`` (c,) fixed: on a coarse grid first, then
+    exactly.
 
-    A dead-zone makes residuals non-smooth where a wheel only just starts to turn, so some starts stall;
-    they are given up when three steps together gain less than 30 %.
+    A dead-zone makes residuals non-smooth where a wheel only just starts to turn, so some starts
+    stall; they are given up when three steps together gain less than 30 %.
     """
     width = run.bounds[:, 1] - run.bounds[:, 0]
     gains = objective.residual_gains()
@@ -60,8 +63,9 @@ def solve_residuals(run: Run, objective: ResidualObjective, start: Array, turns:
     return _exactly(run, objective, x, turns, width, gains)
 
 
-def _exactly(run: Run, objective: ResidualObjective, x: Array, turns: Array, width: Array,
-             gains: Array) -> NewtonOutcome:
+def _exactly(
+    run: Run, objective: ResidualObjective, x: Array, turns: Array, width: Array, gains: Array
+) -> NewtonOutcome:
     """Chord iterations on the residuals without grid error, with the search grid's Jacobian."""
     _, jacobian = _linearised(run, objective.coarse(), x, turns, width)
     best = _exact_residuals(run, objective, x, turns)
@@ -91,8 +95,9 @@ def _grid_residuals(run: Run, objective: ResidualObjective, z: Array, turns: Arr
     return np.vstack([np.broadcast_to(v, (1, z.shape[1])) for v in objective.residuals(z, turns)])
 
 
-def _linearised(run: Run, objective: ResidualObjective, x: Array, turns: Array,
-                width: Array) -> tuple[Array, Array]:
+def _linearised(
+    run: Run, objective: ResidualObjective, x: Array, turns: Array, width: Array
+) -> tuple[Array, Array]:
     """Residuals (m,) at x (d,) and their Jacobian (m, d) by central differences, in one batch."""
     h = np.diag(DIFFERENCE * width)
     columns = np.hstack([x[:, None], x[:, None] + h, x[:, None] - h])
@@ -102,7 +107,8 @@ def _linearised(run: Run, objective: ResidualObjective, x: Array, turns: Array,
 
 
 def _bounded_step(jacobian: Array, r: Array, x: Array, bounds: Array, width: Array) -> Array:
-    """Minimum-norm solution of jacobian @ step = -r with x + step inside the bounds (active set)."""
+    """Minimum-norm solution of jacobian @ step = -r with x + step inside the bounds (active
+    set)."""
     step = np.zeros_like(x)
     free = np.ones(len(x), dtype=bool)
     for _ in range(len(x)):
@@ -119,8 +125,9 @@ def _bounded_step(jacobian: Array, r: Array, x: Array, bounds: Array, width: Arr
     return np.asarray(np.clip(x + step, bounds[:, 0], bounds[:, 1]) - x)
 
 
-def _line_search(run: Run, objective: ResidualObjective, x: Array, step: Array, turns: Array,
-                 r: Array) -> tuple[Array, float]:
+def _line_search(
+    run: Run, objective: ResidualObjective, x: Array, step: Array, turns: Array, r: Array
+) -> tuple[Array, float]:
     """Shorten the step until the residual norm falls enough; all lengths tried in one batch."""
     lengths = 0.5 ** np.arange(8)
     values = _grid_residuals(run, objective, x[:, None] + step[:, None] * lengths, turns)

@@ -12,7 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Starts, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import (
+    Budget,
+    OptimizeResult,
+    Progress,
+    Run,
+    Starts,
+    Status,
+    checked_bounds,
+    checked_x0,
+)
 
 Array = NDArray[np.float64]
 
@@ -25,16 +34,18 @@ _STEP = 0.1  # of the width: BOBYQA's first step, chosen
 class NLopt:
     """One of NLopt's derivative-free methods, on variables scaled to [0, 1].
 
-    "direct" divides the bounds into ever smaller rectangles (Gablonsky's locally biased form) and needs no
-    start (x0 is only evaluated first);
-    "bobyqa" fits quadratic models (Powell 2009) from ``starts`` points: x0 or the middle, then random.
+    "direct" divides the bounds into ever smaller rectangles (Gablonsky's locally biased form) and
+    needs no start (x0 is only evaluated first); "bobyqa" fits quadratic models (Powell 2009) from
+    ``starts`` points: x0 or the middle, then random.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
 
     method: Literal["direct", "bobyqa"]
     starts: int = 10  # chosen
-    tolerance: float = 1e-12  # bobyqa's relative tolerance on the variables; tight, because budgets end searches
+    tolerance: float = (
+        1e-12  # bobyqa's relative tolerance on the variables; tight, because budgets end searches
+    )
 
     @property
     def name(self) -> str:
@@ -44,18 +55,33 @@ class NLopt:
     def stochastic(self) -> bool:
         return self.method == "bobyqa"
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Search. Raises MissingDependencyError without NLopt, ArgumentError for a constrained objective."""
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
+        """Search. Raises MissingDependencyError without NLopt, ArgumentError for a constrained
+        objective."""
         if objective.constrained:
-            raise ArgumentError("optimizer", self.name, "a method that handles constraints for this objective: "
-                                "pso, cma-es, differential-evolution, slsqp or trust-constr")
+            raise ArgumentError(
+                "optimizer",
+                self.name,
+                "a method that handles constraints for this objective: "
+                "pso, cma-es, differential-evolution, slsqp or trust-constr",
+            )
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
         start, package = checked_x0(x0, box), _package()
         return run.finish(self.name, lambda: self._search(package, run, start, rng))
 
-    def _search(self, package: Any, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+    def _search(
+        self, package: Any, run: Run, x0: Array | None, rng: Generator
+    ) -> tuple[Status, str]:
         low, width = run.bounds[:, 0], run.bounds[:, 1] - run.bounds[:, 0]
         d = len(low)
         ended: list[Exception] = []
@@ -66,14 +92,18 @@ class NLopt:
                     return _LARGE
                 try:
                     return min(run.cost(np.clip(low + width * unit, low, low + width)), _LARGE)
-                except Exception as stop:  # the run's end; exceptions do not pass NLopt reliably, so remember it
+                except (
+                    Exception
+                ) as stop:  # the run's end; exceptions do not pass NLopt reliably, so remember it
                     ended.append(stop)
                     search.force_stop()
                     return _LARGE
 
             return cost
 
-        if x0 is not None and self.method == "direct":  # which starts in the middle, whatever it is given
+        if (
+            x0 is not None and self.method == "direct"
+        ):  # which starts in the middle, whatever it is given
             run.evaluate(x0[None])
         starts = Starts(run)
         rounds = 1 if self.method == "direct" else self.starts
@@ -97,14 +127,20 @@ class NLopt:
                 raise ended[0]
             run.nit += 1
             starts.ended(not said, said or f"NLopt's result {search.last_optimize_result()}")
-        return starts.verdict() if self.method == "bobyqa" else (starts.verdict()[0], "no rectangle is left to divide")
+        return (
+            starts.verdict()
+            if self.method == "bobyqa"
+            else (starts.verdict()[0], "no rectangle is left to divide")
+        )
 
 
 def _package() -> Any:
     try:
         import nlopt
     except ImportError:
-        raise MissingDependencyError("nlopt", "optimizers", "the optimizers direct and bobyqa") from None
+        raise MissingDependencyError(
+            "nlopt", "optimizers", "the optimizers direct and bobyqa"
+        ) from None
     return nlopt
 
 

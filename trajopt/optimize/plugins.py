@@ -1,10 +1,11 @@
 """Optimizers from outside the package: by entry point, or from a Python file.
 
-An entry point in the group ``trajopt.optimizers`` names a function or class that makes an optimizer with
-default options. A file, given as ``path/to/file.py`` wherever an optimizer's name is asked, has a module-level
-``OPTIMIZERS``: a mapping of names to such functions or classes (``file.py:name`` picks one of several).
-Files named in the environment variable ``TRAJOPT_PLUGINS`` (separated as in PATH) count as installed: their
-optimizers are known by name in commands, benchmarks and tests that loop over all optimizers.
+An entry point in the group ``trajopt.optimizers`` names a function or class that makes an optimizer
+with default options. A file, given as ``path/to/file.py`` wherever an optimizer's name is asked,
+has a module-level ``OPTIMIZERS``: a mapping of names to such functions or classes (``file.py:name``
+picks one of several). Files named in the environment variable ``TRAJOPT_PLUGINS`` (separated as in
+PATH) count as installed: their optimizers are known by name in commands, benchmarks and tests that
+loop over all optimizers.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ Factory = Callable[[], Any]
 
 
 def installed_optimizers() -> dict[str, Factory]:
-    """Names and factories of the optimizers of installed packages and of the files in TRAJOPT_PLUGINS.
+    """Names and factories of the optimizers of installed packages and of the files in
+    TRAJOPT_PLUGINS.
 
     Raises ArgumentError for a file that cannot be used.
     """
@@ -57,7 +59,9 @@ def plugin(path: str | Path) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         del sys.modules[name]
-        raise ArgumentError("plugin", str(path), f"a file that loads ({type(error).__name__}: {error})") from error
+        raise ArgumentError(
+            "plugin", str(path), f"a file that loads ({type(error).__name__}: {error})"
+        ) from error
     return module
 
 
@@ -69,7 +73,9 @@ def mapping_of_file(path: str | Path, name: str) -> dict[str, Factory]:
 def _mapping(module: ModuleType, name: str, path: str | Path) -> dict[str, Factory]:
     found = getattr(module, name, None)
     if not isinstance(found, Mapping) or not found or not all(callable(v) for v in found.values()):
-        raise ArgumentError("plugin", str(path), f"a mapping {name} of names to functions or classes")
+        raise ArgumentError(
+            "plugin", str(path), f"a mapping {name} of names to functions or classes"
+        )
     return dict(found)
 
 

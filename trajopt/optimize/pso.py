@@ -1,16 +1,19 @@
-"""Particle swarm optimisation, hand-written: the search (``ParticleSwarm``) over a swarm with ask and tell.
+"""Particle swarm optimisation, hand-written: the search (``ParticleSwarm``) over a swarm with ask
+and tell.
 
-The exact update of particle i in dimension j at iteration k, with r1, r2 uniform in [0, 1), drawn anew for
-every particle, dimension and iteration (all of r1 first, then all of r2, particles in rows):
+The exact update of particle i in dimension j at iteration k, with r1, r2 uniform in [0, 1), drawn
+anew for every particle, dimension and iteration (all of r1 first, then all of r2, particles in
+rows):
 
     v_ij <- w_k v_ij + c1 r1 (p_ij - x_ij) + c2 r2 (l_ij - x_ij)
     v_ij <- clip(v_ij, -V_j, V_j)                                  where a velocity limit is set
     x_ij <- x_ij + v_ij,  then the boundary rule
 
 p_i is the particle's best position, l_i its leader: the swarm's best ("gbest") or the best of its
-neighbours on a ring, itself included ("ring"); ties go to the lower index. Both are taken after all particles
-of the iteration were evaluated (synchronous update). "Best" is Deb's feasibility rule. Velocities start at
-zero. w_k = w, or falls linearly from ``inertia`` to ``final_inertia`` over ``horizon`` iterations.
+neighbours on a ring, itself included ("ring"); ties go to the lower index. Both are taken after all
+particles of the iteration were evaluated (synchronous update). "Best" is Deb's feasibility rule.
+Velocities start at zero. w_k = w, or falls linearly from ``inertia`` to ``final_inertia`` over
+``horizon`` iterations.
 """
 
 from __future__ import annotations
@@ -24,32 +27,44 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import (
+    Budget,
+    OptimizeResult,
+    Progress,
+    Run,
+    Status,
+    checked_bounds,
+    checked_x0,
+)
 from trajopt.optimize.swarm import Swarm, SwarmRules
 
 Array = NDArray[np.float64]
 
 Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
-_CHOICES = {"topology": ("gbest", "ring"), "boundary": ("reset", "reflect", "mirror", "absorb", "invisible", "none"),
-            "start": ("uniform", "grid", "sobol")}
+_CHOICES = {
+    "topology": ("gbest", "ring"),
+    "boundary": ("reset", "reflect", "mirror", "absorb", "invisible", "none"),
+    "start": ("uniform", "grid", "sobol"),
+}
 
 
 @dataclass(frozen=True)
 class ParticleSwarm:
     """PSO. Defaults are the constriction PSO with a global best; the functions below are presets.
 
-    ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position inside 0.9
-    of the space (thesis 000, Table 5.4) and stops the particle; "reflect" mirrors it back and reverses its
-    velocity in that dimension; "mirror" mirrors it back alone (as pyswarms's "reflective"); "absorb" puts it on
-    the border and stops it there; "invisible" lets it fly on without evaluating it (Robinson and Rahmat-Samii
-    2004); "none" evaluates it outside, where it counts as infeasible.
-    ``start``: "uniform" draws positions uniformly; "grid" lays the first two variables on a grid (Table 5.4);
-    "sobol" takes a Sobol sequence with a random shift.
+    ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position
+    inside 0.9 of the space (thesis 000, Table 5.4) and stops the particle; "reflect" mirrors it
+    back and reverses its velocity in that dimension; "mirror" mirrors it back alone (as pyswarms's
+    "reflective"); "absorb" puts it on the border and stops it there; "invisible" lets it fly on
+    without evaluating it (Robinson and Rahmat-Samii 2004); "none" evaluates it outside, where it
+    counts as infeasible. ``start``: "uniform" draws positions uniformly; "grid" lays the first two
+    variables on a grid (Table 5.4); "sobol" takes a Sobol sequence with a random shift.
     ``velocity_limit``: largest velocity as a share of the width of the bounds; None: unlimited.
     ``stagnation``: iterations without improvement after which the search ends; None: never.
-    ``restart``: where the search would end by itself (stagnation, collapse, all particles lost), a new swarm
-    starts instead, its first particle on the best candidate so far; then only the budget ends the search.
+    ``restart``: where the search would end by itself (stagnation, collapse, all particles lost), a
+    new swarm starts instead, its first particle on the best candidate so far; then only the budget
+    ends the search.
     """
 
     name: ClassVar[str] = "pso"
@@ -64,7 +79,9 @@ class ParticleSwarm:
     neighbours: int = 1  # on each side of the ring; Bratton and Kennedy 2007
     boundary: Boundary = "reflect"  # chosen
     start: Literal["uniform", "grid", "sobol"] = "uniform"
-    velocity_limit: float | None = None  # the constriction factor makes one unnecessary, Clerc and Kennedy 2002
+    velocity_limit: float | None = (
+        None  # the constriction factor makes one unnecessary, Clerc and Kennedy 2002
+    )
     final_inertia: float | None = None
     horizon: int = 500  # iterations, thesis 000 Table 5.8
     stagnation: int | None = None
@@ -77,17 +94,30 @@ class ParticleSwarm:
             if getattr(self, option) not in choices:
                 raise ArgumentError(option, getattr(self, option), "one of " + ", ".join(choices))
         if not 1 <= self.neighbours < self.particles:
-            raise ArgumentError("neighbours", self.neighbours, "a whole number from 1 to particles - 1")
+            raise ArgumentError(
+                "neighbours", self.neighbours, "a whole number from 1 to particles - 1"
+            )
         if self.velocity_limit is not None and not self.velocity_limit > 0:
-            raise ArgumentError("velocity_limit", self.velocity_limit, "a share of the width > 0, or None")
+            raise ArgumentError(
+                "velocity_limit", self.velocity_limit, "a share of the width > 0, or None"
+            )
         if self.horizon < 1:
             raise ArgumentError("horizon", self.horizon, "at least 1 iteration")
         if self.stagnation is not None and self.stagnation < 1:
             raise ArgumentError("stagnation", self.stagnation, "at least 1 iteration, or None")
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Search until the budget ends or, without ``restart``, the swarm stagnates or collapses to one point.
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
+        """Search until the budget ends or, without ``restart``, the swarm stagnates or collapses to
+        one point.
 
         ``x0`` (d,) becomes the first particle's position.
         """
@@ -104,11 +134,27 @@ class ParticleSwarm:
         return run.finish(self.name, search)
 
     def swarm(self, bounds: ArrayLike, rng: Generator, *, x0: ArrayLike | None = None) -> Swarm:
-        """A swarm of one's own to drive: ``x = swarm.ask()``, evaluate, ``swarm.tell(cost, violation)``."""
+        """A swarm of one's own to drive: ``x = swarm.ask()``, evaluate, ``swarm.tell(cost,
+        violation)``."""
         box = checked_bounds(bounds)
-        return Swarm.begin(SwarmRules(
-            self.particles, self.inertia, self.cognitive, self.social, self.topology, self.neighbours, self.boundary,
-            self.start, self.velocity_limit, self.final_inertia, self.horizon), box, rng, checked_x0(x0, box))
+        return Swarm.begin(
+            SwarmRules(
+                self.particles,
+                self.inertia,
+                self.cognitive,
+                self.social,
+                self.topology,
+                self.neighbours,
+                self.boundary,
+                self.start,
+                self.velocity_limit,
+                self.final_inertia,
+                self.horizon,
+            ),
+            box,
+            rng,
+            checked_x0(x0, box),
+        )
 
     def _search(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
         unseen = 0  # iterations in a row without a particle inside
@@ -125,7 +171,10 @@ class ParticleSwarm:
                 swarm.tell(np.zeros(0))
                 unseen += 1
                 if unseen >= _LOST:
-                    return Status.CONVERGED, f"all particles stayed outside the bounds for {_LOST} iterations"
+                    return (
+                        Status.CONVERGED,
+                        f"all particles stayed outside the bounds for {_LOST} iterations",
+                    )
             run.nit += 1
             if swarm.collapsed:
                 return Status.CONVERGED, "the swarm has collapsed to one point"
@@ -134,35 +183,42 @@ class ParticleSwarm:
 
 
 def constriction() -> ParticleSwarm:
-    """Constriction PSO with a global best (Clerc and Kennedy 2002): the reference, quick to converge."""
+    """Constriction PSO with a global best (Clerc and Kennedy 2002): the reference, quick to
+    converge."""
     return ParticleSwarm()
 
 
 def local_best() -> ParticleSwarm:
     """Constriction on a ring of two neighbours, reflected at the bounds: the package's best preset.
 
-    Slower to converge than the global best, and so caught in fewer local minima: on the eight problems of thesis
-    000 through the actuators its median over seeds is the best value known, or near it (docs/pso_vs_gradient.md).
+    Slower to converge than the global best, and so caught in fewer local minima: on the eight
+    problems of thesis 000 through the actuators its median over seeds is the best value known, or
+    near it (docs/pso_vs_gradient.md).
     """
     return ParticleSwarm(topology="ring")
 
 
 def ring() -> ParticleSwarm:
-    """Standard PSO of Bratton and Kennedy 2007: constriction, ring of two neighbours, invisible outside."""
+    """Standard PSO of Bratton and Kennedy 2007: constriction, ring of two neighbours, invisible
+    outside."""
     return ParticleSwarm(topology="ring", boundary="invisible")
 
 
 def falling_inertia() -> ParticleSwarm:
-    """Shi and Eberhart 1998: inertia from 0.9 to 0.4, c1 = c2 = 2, velocity clamped to the space's width."""
-    return ParticleSwarm(inertia=0.9, final_inertia=0.4, cognitive=2.0, social=2.0, velocity_limit=1.0)
+    """Shi and Eberhart 1998: inertia from 0.9 to 0.4, c1 = c2 = 2, velocity clamped to the space's
+    width."""
+    return ParticleSwarm(
+        inertia=0.9, final_inertia=0.4, cognitive=2.0, social=2.0, velocity_limit=1.0
+    )
 
 
 def thesis_first() -> ParticleSwarm:
     """Thesis 000, Table 5.2: c1 = c2 = 0.45, no inertia weight, particles may leave the space.
 
-    Nothing damps this swarm (with w = 1 the variance of a particle's position grows without bound, whatever c1
-    and c2 are) and nothing brings it back: soon all particles are outside for good, and a larger budget
-    changes nothing. ``dataclasses.replace(thesis_first(), stagnation=20, restart=True)`` uses one.
+    Nothing damps this swarm (with w = 1 the variance of a particle's position grows without bound,
+    whatever c1 and c2 are) and nothing brings it back: soon all particles are outside for good, and
+    a larger budget changes nothing. ``dataclasses.replace(thesis_first(), stagnation=20,
+    restart=True)`` uses one.
     """
     return ParticleSwarm(inertia=1.0, cognitive=0.45, social=0.45, boundary="none", start="grid")
 

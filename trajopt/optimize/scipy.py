@@ -1,4 +1,5 @@
-"""Methods of scipy.optimize behind the package's contract. The only module that imports scipy.optimize."""
+"""Methods of scipy.optimize behind the package's contract. The only module that imports
+scipy.optimize."""
 
 from __future__ import annotations
 
@@ -12,7 +13,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective, ResidualObjective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Starts, Status, checked_bounds, checked_x0
+from trajopt.optimize.base import (
+    Budget,
+    OptimizeResult,
+    Progress,
+    Run,
+    Starts,
+    Status,
+    checked_bounds,
+    checked_x0,
+)
 
 Array = NDArray[np.float64]
 
@@ -28,7 +38,9 @@ class _Point:
     value: Evaluation | None = None
 
     def at(self, x: Array) -> Evaluation:
-        inside = np.clip(x, self.run.bounds[:, 0], self.run.bounds[:, 1])  # undo rounding beyond the bounds
+        inside = np.clip(
+            x, self.run.bounds[:, 0], self.run.bounds[:, 1]
+        )  # undo rounding beyond the bounds
         if self.value is None or not np.array_equal(inside, self.x):
             self.x, self.value = inside.copy(), self.run.evaluate(inside[None])
         return self.value
@@ -42,10 +54,12 @@ class _Point:
 
 @dataclass(frozen=True)
 class ScipyLocal:
-    """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from random points.
+    """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from
+    random points.
 
-    ``starts``: number of starts; later ones are drawn uniformly from the bounds. Derivatives are the
-    objective's own where it offers them, SciPy's finite differences (counted as evaluations) otherwise.
+    ``starts``: number of starts; later ones are drawn uniformly from the bounds. Derivatives are
+    the objective's own where it offers them, SciPy's finite differences (counted as evaluations)
+    otherwise.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
@@ -59,13 +73,25 @@ class ScipyLocal:
     def name(self) -> str:
         return self.method.lower()
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Search from each start in turn. Raises ArgumentError for a constrained objective where the method
-        knows only bounds (l-bfgs-b, nelder-mead)."""
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
+        """Search from each start in turn. Raises ArgumentError for a constrained objective where
+        the method knows only bounds (l-bfgs-b, nelder-mead)."""
         if objective.constrained and self.method in ("L-BFGS-B", "Nelder-Mead"):
-            raise ArgumentError("optimizer", self.name, "a method that handles constraints for this objective: "
-                                "pso, differential-evolution, slsqp or trust-constr")
+            raise ArgumentError(
+                "optimizer",
+                self.name,
+                "a method that handles constraints for this objective: "
+                "pso, differential-evolution, slsqp or trust-constr",
+            )
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
@@ -88,12 +114,20 @@ class ScipyLocal:
             if index > 0:
                 start = rng.uniform(low, high)
             constraints = optimize.NonlinearConstraint(point.violation, -np.inf, 0.0)
-            with warnings.catch_warnings():  # trust-constr warns where a gradient stays, as on piecewise linear costs
+            with (
+                warnings.catch_warnings()
+            ):  # trust-constr warns where a gradient stays, as on piecewise linear costs
                 warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
                 result = optimize.minimize(
-                    point.cost, start, method=self.method, bounds=optimize.Bounds(low, high), tol=self.tolerance,
-                    jac=gradient if offered else None, options=options,
-                    **({"constraints": [constraints]} if run.objective.constrained else {}))
+                    point.cost,
+                    start,
+                    method=self.method,
+                    bounds=optimize.Bounds(low, high),
+                    tol=self.tolerance,
+                    jac=gradient if offered else None,
+                    options=options,
+                    **({"constraints": [constraints]} if run.objective.constrained else {}),
+                )
             run.nit += int(result.nit)
             starts.ended(_flagged(result) is Status.CONVERGED, str(result.message))
         return starts.verdict()
@@ -108,11 +142,22 @@ class DifferentialEvolution:
     stochastic: ClassVar[bool] = True
 
     population: int = 15  # SciPy's default
-    tolerance: float = 1e-12  # SciPy's tol on the population's spread; tight, because budgets end searches
+    tolerance: float = (
+        1e-12  # SciPy's tol on the population's spread; tight, because budgets end searches
+    )
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
-        """Search until the population has collapsed or the budget ends, then SciPy's local polish."""
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
+        """Search until the population has collapsed or the budget ends, then SciPy's local
+        polish."""
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
@@ -124,7 +169,8 @@ class DifferentialEvolution:
         point = _Point(run)
 
         def costs(x: Array) -> Any:
-            """SciPy hands one candidate (d,) when polishing and candidates in columns (d, n) otherwise."""
+            """SciPy hands one candidate (d,) when polishing and candidates in columns (d, n)
+            otherwise."""
             if x.ndim == 1:
                 return point.cost(x)
             return np.minimum(run.evaluate(x.T).cost, _LARGE)
@@ -133,8 +179,16 @@ class DifferentialEvolution:
         if constrained:  # SciPy evaluates constraints one by one unless both are vectorised
             extra = {"constraints": (optimize.NonlinearConstraint(point.violation, -np.inf, 0.0),)}
         result = optimize.differential_evolution(
-            point.cost if constrained else costs, optimize.Bounds(*run.bounds.T), x0=x0, rng=rng,
-            popsize=self.population, tol=self.tolerance, maxiter=1_000_000, polish=not constrained, **extra)
+            point.cost if constrained else costs,
+            optimize.Bounds(*run.bounds.T),
+            x0=x0,
+            rng=rng,
+            popsize=self.population,
+            tol=self.tolerance,
+            maxiter=1_000_000,
+            polish=not constrained,
+            **extra,
+        )
         run.nit = int(result.nit)
         return _flagged(result), str(result.message)
 
@@ -147,12 +201,24 @@ class DualAnnealing:
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
         """Search until the budget ends. Raises ArgumentError for a constrained objective."""
         if objective.constrained:
-            raise ArgumentError("optimizer", self.name, "a method that handles constraints for this objective: "
-                                "pso, differential-evolution, slsqp or trust-constr")
+            raise ArgumentError(
+                "optimizer",
+                self.name,
+                "a method that handles constraints for this objective: "
+                "pso, differential-evolution, slsqp or trust-constr",
+            )
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
         return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
@@ -160,18 +226,25 @@ class DualAnnealing:
     def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         from scipy import optimize
 
-        result = optimize.dual_annealing(_Point(run).cost, optimize.Bounds(*run.bounds.T), x0=x0, rng=rng,
-                                         maxiter=1_000_000, maxfun=1_000_000_000)
+        result = optimize.dual_annealing(
+            _Point(run).cost,
+            optimize.Bounds(*run.bounds.T),
+            x0=x0,
+            rng=rng,
+            maxiter=1_000_000,
+            maxfun=1_000_000_000,
+        )
         run.nit = int(result.nit)
         return _flagged(result), str(result.message[0])
 
 
 @dataclass(frozen=True)
 class LeastSquares:
-    """scipy.optimize.least_squares (trust-region reflective) on the gain-weighted residuals, whole turns fixed.
+    """scipy.optimize.least_squares (trust-region reflective) on the gain-weighted residuals, whole
+    turns fixed.
 
-    Starts from x0 or the middle, then from random points; ``starts`` in all. Derivatives are SciPy's finite
-    differences, counted as evaluations.
+    Starts from x0 or the middle, then from random points; ``starts`` in all. Derivatives are
+    SciPy's finite differences, counted as evaluations.
     """
 
     name: ClassVar[str] = "least-squares"
@@ -181,8 +254,16 @@ class LeastSquares:
     starts: int = 20  # chosen
     tolerance: float = 1e-15  # SciPy's xtol, ftol and gtol; tight, because budgets end searches
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
         """Search from each start in turn."""
         box = checked_bounds(bounds, objective.dimension)
         run = Run(objective, box, budget, progress)
@@ -206,8 +287,15 @@ class LeastSquares:
 
             # SciPy asks for a start strictly inside.
             inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-            result = optimize.least_squares(weighted, inside, bounds=(low, high), x_scale=high - low,
-                                            xtol=self.tolerance, ftol=self.tolerance, gtol=self.tolerance)
+            result = optimize.least_squares(
+                weighted,
+                inside,
+                bounds=(low, high),
+                x_scale=high - low,
+                xtol=self.tolerance,
+                ftol=self.tolerance,
+                gtol=self.tolerance,
+            )
             run.nit += int(result.njev)
             run.evaluate(np.clip(result.x, low, high)[None])
             run.propose(result.x)

@@ -40,20 +40,23 @@ OPTIMIZERS: dict[str, tuple[str, str]] = {
 
 
 def optimizer_names() -> tuple[str, ...]:
-    """All optimizers: the package's own, then those of installed packages and of files in TRAJOPT_PLUGINS."""
+    """All optimizers: the package's own, then those of installed packages and of files in
+    TRAJOPT_PLUGINS."""
     return (*OPTIMIZERS, *(name for name in installed_optimizers() if name not in OPTIMIZERS))
 
 
 def optimizer_named(name: str) -> Optimizer:
     """The optimizer called ``name`` with its default options.
 
-    Also one of an installed package, or of a file: "file.py" or "file.py:name" (see ``optimize.plugins``).
-    Raises ArgumentError for an unknown name.
+    Also one of an installed package, or of a file: "file.py" or "file.py:name" (see
+    ``optimize.plugins``). Raises ArgumentError for an unknown name.
     """
     if name in OPTIMIZERS:
         module, attribute = OPTIMIZERS[name]
         return checked_optimizer(name, getattr(importlib.import_module(module), attribute)())
-    file, _, wanted = name.partition(".py:") if ".py:" in name else (name.removesuffix(".py"), "", "")
+    file, _, wanted = (
+        name.partition(".py:") if ".py:" in name else (name.removesuffix(".py"), "", "")
+    )
     if file != name:
         offered = optimizers_of_file(file + ".py")
         wanted = wanted or next(iter(offered))
@@ -66,45 +69,71 @@ def optimizer_named(name: str) -> Optimizer:
 
 
 def checked_optimizer(name: str, made: Any) -> Optimizer:
-    """``made``, if it keeps the contract of optimizers. Raises ArgumentError naming what is missing."""
+    """``made``, if it keeps the contract of optimizers. Raises ArgumentError naming what is
+    missing."""
     for attribute in ("name", "needs", "stochastic", "minimize"):
         if not hasattr(made, attribute):
-            raise ArgumentError("optimizer", name, f"an object with '{attribute}' (optimize.base.Optimizer)")
+            raise ArgumentError(
+                "optimizer", name, f"an object with '{attribute}' (optimize.base.Optimizer)"
+            )
     return cast(Optimizer, made)
 
 
 def automatic(objective: Objective) -> str:
     """Name of the optimizer that suits an objective best.
 
-    The lattice where it is exact by construction; otherwise the swarm, which asks nothing of the objective.
+    The lattice where it is exact by construction; otherwise the swarm, which asks nothing of the
+    objective.
     """
     if hasattr(objective, "affine_part"):
         return "lattice"
     return "pso" if Capability.BATCH in objective.provides else "differential-evolution"
 
 
-def minimize(objective: Objective | Callable[[Any], Any], bounds: ArrayLike, *,
-             optimizer: str | Optimizer = "auto", x0: ArrayLike | None = None, seed: int = 0,
-             budget: Budget | None = None,
-             progress: Callable[[int, float], None] | None = None) -> OptimizeResult:
+def minimize(
+    objective: Objective | Callable[[Any], Any],
+    bounds: ArrayLike,
+    *,
+    optimizer: str | Optimizer = "auto",
+    x0: ArrayLike | None = None,
+    seed: int = 0,
+    budget: Budget | None = None,
+    progress: Callable[[int, float], None] | None = None,
+) -> OptimizeResult:
     """Minimise an objective, or a plain function, inside ``bounds`` (d, 2).
 
-    A function may map one candidate (d,) to a number, or a batch (n, d) to (n,). ``optimizer`` is a name
-    (see ``OPTIMIZERS``), an optimizer with options, or "auto", which says in the message what it took. The
-    same ``seed`` and a budget in evaluations give the same bits. ``progress(evaluations, best_cost)`` is called
-    after every batch. Raises ArgumentError for bad input.
+    A function may map one candidate (d,) to a number, or a batch (n, d) to (n,). ``optimizer`` is a
+    name (see ``OPTIMIZERS``), an optimizer with options, or "auto", which says in the message what
+    it took. The same ``seed`` and a budget in evaluations give the same bits.
+    ``progress(evaluations, best_cost)`` is called after every batch. Raises ArgumentError for bad
+    input.
     """
     box = checked_bounds(bounds)
     problem = as_objective(objective, box)
     if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
         raise ArgumentError("seed", seed, "a whole number >= 0")
     chosen = automatic(problem) if optimizer == "auto" else optimizer
-    method = optimizer_named(chosen) if isinstance(chosen, str) else checked_optimizer(repr(chosen), chosen)
+    method = (
+        optimizer_named(chosen)
+        if isinstance(chosen, str)
+        else checked_optimizer(repr(chosen), chosen)
+    )
     if not (budget is None or isinstance(budget, Budget)):
         raise ArgumentError("budget", budget, "a Budget, e.g. Budget(evaluations=1000)")
     missing = method.needs - problem.provides
     if missing:
-        raise ArgumentError("optimizer", method.name, "an optimizer that works without " + ", ".join(
-            sorted(c.name.lower() for c in missing)) + ", which this objective does not offer")
-    return method.minimize(problem, box, x0=x0, rng=np.random.default_rng(seed),
-                           budget=budget or Budget(), progress=progress)
+        raise ArgumentError(
+            "optimizer",
+            method.name,
+            "an optimizer that works without "
+            + ", ".join(sorted(c.name.lower() for c in missing))
+            + ", which this objective does not offer",
+        )
+    return method.minimize(
+        problem,
+        box,
+        x0=x0,
+        rng=np.random.default_rng(seed),
+        budget=budget or Budget(),
+        progress=progress,
+    )

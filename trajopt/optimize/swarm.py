@@ -1,4 +1,5 @@
-"""The swarm itself, with ask and tell: the state of a particle swarm that can be saved and resumed bit by bit.
+"""The swarm itself, with ask and tell: the state of a particle swarm that can be saved and resumed
+bit by bit.
 
 ``trajopt.optimize.pso`` documents the update rule and the options.
 """
@@ -45,7 +46,8 @@ class SwarmRules:
 
 @dataclass(eq=False)
 class Swarm:
-    """Positions ``x``, velocities ``v``, own bests; mutable by nature. ``idle``: iterations since it improved."""
+    """Positions ``x``, velocities ``v``, own bests; mutable by nature. ``idle``: iterations since
+    it improved."""
 
     rules: SwarmRules
     bounds: Array
@@ -66,23 +68,37 @@ class Swarm:
         self._low, self._high = np.ascontiguousarray(self.bounds.T)
         width = self._high - self._low
         self._rest = _COLLAPSED * width
-        self._limit = width * (np.inf if self.rules.velocity_limit is None else self.rules.velocity_limit)
+        self._limit = width * (
+            np.inf if self.rules.velocity_limit is None else self.rules.velocity_limit
+        )
         self._kernel = _kernel()
         self._pulls = np.empty((2, *self.x.shape))
         self._drawn = np.empty((2, *self.x.shape))
         self._leaders = np.zeros(len(self.x), dtype=np.intp)
 
     @classmethod
-    def begin(cls, rules: SwarmRules, bounds: Array, rng: Generator, x0: Array | None = None) -> Swarm:
+    def begin(
+        cls, rules: SwarmRules, bounds: Array, rng: Generator, x0: Array | None = None
+    ) -> Swarm:
         """A new swarm; ``x0`` (d,) becomes the first particle's position."""
         x = _positions(rules, bounds, rng)
         if x0 is not None:
             x[0] = x0
         n = len(x)
-        return cls(rules, bounds, rng, x, np.zeros_like(x), x.copy(), np.full(n, np.inf), np.full(n, np.inf))
+        return cls(
+            rules,
+            bounds,
+            rng,
+            x,
+            np.zeros_like(x),
+            x.copy(),
+            np.full(n, np.inf),
+            np.full(n, np.inf),
+        )
 
     def ask(self) -> Array:
-        """(m, d): the candidates to evaluate; fewer than particles only where some are invisible."""
+        """(m, d): the candidates to evaluate; fewer than particles only where some are
+        invisible."""
         return self.x[self._seen()] if self.rules.boundary == "invisible" else self.x.copy()
 
     def tell(self, cost: ArrayLike, violation: ArrayLike | None = None) -> None:
@@ -98,7 +114,9 @@ class Swarm:
             self._remember(cost, violation)
             leader = best_index(self.own_cost, self.own_violation)
         else:
-            leader = self._kernel.remember(self.x, self.own, self.own_cost, self.own_violation, cost, violation)
+            leader = self._kernel.remember(
+                self.x, self.own, self.own_cost, self.own_violation, cost, violation
+            )
         reached = self.own_cost[leader], self.own_violation[leader]
         self.idle = 0 if better(*reached, *self._reached) else self.idle + 1
         self._reached = float(reached[0]), float(reached[1])
@@ -107,13 +125,16 @@ class Swarm:
         elif self._kernel is None:
             self._leaders[:] = self._ring_leaders()
         else:
-            self._kernel.ring_leaders(self.own_cost, self.own_violation, self.rules.neighbours, self._leaders)
+            self._kernel.ring_leaders(
+                self.own_cost, self.own_violation, self.rules.neighbours, self._leaders
+            )
         self._move()
         self.iteration += 1
 
     @property
     def best(self) -> tuple[Array, float, float]:
-        """Best candidate (d,) told so far, its cost and violation (both inf before the first ``tell``)."""
+        """Best candidate (d,) told so far, its cost and violation (both inf before the first
+        ``tell``)."""
         i = best_index(self.own_cost, self.own_violation)
         return self.own[i].copy(), float(self.own_cost[i]), float(self.own_violation[i])
 
@@ -122,18 +143,35 @@ class Swarm:
         """Whether all particles rest at one point, so that nothing can change any more."""
         if abs(float(self.v[0, 0])) > self._rest[0]:  # the usual case, and quick
             return False
-        return bool(np.all(np.abs(self.v) <= self._rest) and np.all(np.abs(self.x - self.x[0]) <= self._rest))
+        return bool(
+            np.all(np.abs(self.v) <= self._rest)
+            and np.all(np.abs(self.x - self.x[0]) <= self._rest)
+        )
 
-    # -- saving ---------------------------------------------------------------------------------------
+    # -- saving
+    # ---------------------------------------------------------------------------------------
 
     def save(self, path: str | Path) -> None:
-        """Write the whole state to ``path`` (*.npz), under a temporary name first; ``load`` goes on from it."""
+        """Write the whole state to ``path`` (*.npz), under a temporary name first; ``load`` goes on
+        from it."""
         target = Path(path)
-        state = json.dumps({"rules": asdict(self.rules), "iteration": self.iteration, "idle": self.idle,
-                            "rng": self.rng.bit_generator.state}, default=_plain)
+        state = json.dumps(
+            {
+                "rules": asdict(self.rules),
+                "iteration": self.iteration,
+                "idle": self.idle,
+                "rng": self.rng.bit_generator.state,
+            },
+            default=_plain,
+        )
         part = target.with_name(target.name + ".part")
         with part.open("wb") as file:
-            np.savez(file, allow_pickle=False, state=np.array(state), **{name: getattr(self, name) for name in _ARRAYS})
+            np.savez(
+                file,
+                allow_pickle=False,
+                state=np.array(state),
+                **{name: getattr(self, name) for name in _ARRAYS},
+            )
         part.replace(target)
 
     @classmethod
@@ -149,12 +187,35 @@ class Swarm:
             kind = getattr(np.random, state["rng"]["bit_generator"])()
             kind.state = _restored(state["rng"])
             rules = SwarmRules(**state["rules"])
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, BadZipFile, zlib.error) as error:
-            raise ArgumentError("path", str(path), f"a file written by Swarm.save ({error})") from None
+        except (
+            OSError,
+            ValueError,
+            KeyError,
+            TypeError,
+            AttributeError,
+            EOFError,
+            BadZipFile,
+            zlib.error,
+        ) as error:
+            raise ArgumentError(
+                "path", str(path), f"a file written by Swarm.save ({error})"
+            ) from None
         bounds, x, v, own, cost, violation = arrays
-        return cls(rules, bounds, Generator(kind), x, v, own, cost, violation, state["iteration"], state["idle"])
+        return cls(
+            rules,
+            bounds,
+            Generator(kind),
+            x,
+            v,
+            own,
+            cost,
+            violation,
+            state["iteration"],
+            state["idle"],
+        )
 
-    # -- one iteration --------------------------------------------------------------------------------
+    # -- one iteration
+    # --------------------------------------------------------------------------------
 
     def _seen(self) -> NDArray[np.bool_]:
         low, high = self.bounds.T
@@ -163,11 +224,15 @@ class Swarm:
     def _told(self, cost: ArrayLike, violation: ArrayLike | None) -> tuple[Array, Array]:
         """Costs and violations (n,) of all particles; infinite for NaN and for invisible ones."""
         cost = np.asarray(cost, dtype=np.float64)
-        violation = np.zeros(cost.shape) if violation is None else np.asarray(violation, dtype=np.float64)
+        violation = (
+            np.zeros(cost.shape) if violation is None else np.asarray(violation, dtype=np.float64)
+        )
         seen = self._seen() if self.rules.boundary == "invisible" else None
         wanted = len(self.x) if seen is None else int(seen.sum())
         if cost.shape != (wanted,) or violation.shape != (wanted,):
-            raise ArgumentError("cost", cost.shape, f"shape ({wanted},): one entry a candidate asked")
+            raise ArgumentError(
+                "cost", cost.shape, f"shape ({wanted},): one entry a candidate asked"
+            )
         bad = np.isnan(cost) | np.isnan(violation)
         if bad.any():
             cost, violation = np.where(bad, np.inf, cost), np.where(bad, np.inf, violation)
@@ -205,8 +270,19 @@ class Swarm:
         r = self.rng.random(out=self._drawn)
         low, high = self._low, self._high
         if self._kernel is not None:
-            if not self._kernel.move(x, v, self.own, self._leaders, r, self._inertia(), rules.cognitive, rules.social,
-                                     low, high, self._limit):
+            if not self._kernel.move(
+                x,
+                v,
+                self.own,
+                self._leaders,
+                r,
+                self._inertia(),
+                rules.cognitive,
+                rules.social,
+                low,
+                high,
+                self._limit,
+            ):
                 return  # no coordinate lies outside
         else:
             self._move_readably(r)
@@ -238,8 +314,16 @@ class Swarm:
         return rules.inertia + (rules.final_inertia - rules.inertia) * done
 
 
-def _bring_back(boundary: str, x: Array, v: Array, low: Array, high: Array, rows: NDArray[np.intp],
-                columns: NDArray[np.intp], rng: Generator) -> None:
+def _bring_back(
+    boundary: str,
+    x: Array,
+    v: Array,
+    low: Array,
+    high: Array,
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+    rng: Generator,
+) -> None:
     """Apply a boundary rule to the coordinates outside, x[rows, columns], in place."""
     if boundary == "reset":  # thesis 000, Table 5.4: anew, inside 0.9 of the space
         lost, width = np.unique(rows), high - low
@@ -258,7 +342,8 @@ def _bring_back(boundary: str, x: Array, v: Array, low: Array, high: Array, rows
 
 
 def _kernel() -> Any:
-    """The compiled iteration where numba has been loaded already (by a compiled objective, say); else None.
+    """The compiled iteration where numba has been loaded already (by a compiled objective, say);
+    else None.
 
     Loading numba takes longer than it saves in one search. Both forms give the same bits.
     """
@@ -281,8 +366,8 @@ def _positions(rules: SwarmRules, bounds: Array, rng: Generator) -> Array:
         return np.asarray(low + width * ((unit + rng.random(d)) % 1.0))
     x = low + width * rng.random((n, d))
     if rules.start == "grid" and d >= 2:
-        # Table 5.4 prints a row index it does not use; we read a grid of n/10 columns by 10 rows with
-        # spacings of 1/(n/10 + 1) and 1/11 of the space.
+        # Table 5.4 prints a row index it does not use; we read a grid of n/10 columns by 10 rows
+        # with spacings of 1/(n/10 + 1) and 1/11 of the space.
         columns = max(1, n // 10)
         i = np.arange(n)
         x[:, 0] = low[0] + width[0] * (i // 10 % columns + 1) / (columns + 1)

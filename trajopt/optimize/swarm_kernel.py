@@ -1,6 +1,7 @@
 """One iteration of a swarm as a numba kernel: the same bits as the NumPy form of ``swarm``.
 
-No fast-math, so that every operation is rounded as NumPy rounds it; a test holds the two together exactly.
+No fast-math, so that every operation is rounded as NumPy rounds it; a test holds the two together
+exactly.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
         elif new or old:
             improved = new
         else:
-            improved = violation[i] < own_violation[i] or (violation[i] == own_violation[i] and cost[i] < own_cost[i])
+            improved = violation[i] < own_violation[i] or (
+                violation[i] == own_violation[i] and cost[i] < own_cost[i]
+            )
         if improved:
             own_cost[i], own_violation[i] = cost[i], violation[i]
             for j in range(d):
@@ -30,15 +33,19 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
     best, feasible = 0, own_violation[0] <= FEASIBLE
     for i in range(1, n):
         inside = own_violation[i] <= FEASIBLE
-        if (inside and not feasible) or (inside and own_cost[i] < own_cost[best]) or (
-                not feasible and own_violation[i] < own_violation[best]):
+        if (
+            (inside and not feasible)
+            or (inside and own_cost[i] < own_cost[best])
+            or (not feasible and own_violation[i] < own_violation[best])
+        ):
             best, feasible = i, inside or feasible
     return best
 
 
 @numba.njit(cache=True, error_model="numpy")
 def ring_leaders(own_cost, own_violation, reach, leaders):  # type: ignore[no-untyped-def]
-    """Fill ``leaders`` (n,): the index of the best own position within ``reach`` places on the ring."""
+    """Fill ``leaders`` (n,): the index of the best own position within ``reach`` places on the
+    ring."""
     n = len(own_cost)
     for i in range(n):
         best = i
@@ -46,8 +53,10 @@ def ring_leaders(own_cost, own_violation, reach, leaders):  # type: ignore[no-un
             j = (i + k) % n
             new = 0.0 if own_violation[j] <= FEASIBLE else own_violation[j]
             old = 0.0 if own_violation[best] <= FEASIBLE else own_violation[best]
-            if new < old or (new == old and (own_cost[j] < own_cost[best]
-                                             or (own_cost[j] == own_cost[best] and j < best))):
+            if new < old or (
+                new == old
+                and (own_cost[j] < own_cost[best] or (own_cost[j] == own_cost[best] and j < best))
+            ):
                 best = j
         leaders[i] = best
 

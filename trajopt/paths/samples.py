@@ -6,7 +6,8 @@ With path speed s' and path acceleration s'', everything a limit needs is linear
     its time derivative               = twist s'' + twist_rate s'^2
     acceleration, body frame          = (twist_x, twist_y, 0) s'' + acceleration_rate s'^2
 
-On a slope the body frame is tangent to the surface: x along the heading, z along the surface normal.
+On a slope the body frame is tangent to the surface: x along the heading, z along the surface
+normal.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PathSamples:
-    """Geometry at N gridpoints. SI units; the body frame is x forward, y left, z up (surface normal)."""
+    """Geometry at N gridpoints. SI units; the body frame is x forward, y left, z up (surface
+    normal)."""
 
     s: Array  # (N,) path parameter, m
     u: Array  # (N,) spline parameter
@@ -35,18 +37,21 @@ class PathSamples:
     twist_rate: Array  # (N, 3) d twist / ds
     acceleration_rate: Array  # (N, 3) body-frame acceleration per s'^2
     gravity: Array  # (N, 3) direction of gravity in the body frame (unit vector)
-    curvature: Array  # (N,) geodesic curvature of the track, 1/m (0 where the robot turns on the spot)
+    curvature: (
+        Array  # (N,) geodesic curvature of the track, 1/m (0 where the robot turns on the spot)
+    )
     slope: Array  # (N,) rad, positive uphill along the direction of travel
 
 
 _STANDS = 1e-9  # share of the path's rate ds/du below which it stands still
-_STILL = ("the path stands still or doubles back here; move or drop a control point, or split the path at the stop")
+_STILL = "the path stands still or doubles back here; move or drop a control point, or split the path at the stop"
 
 
 def sample_path(path: Path, s: Array) -> PathSamples:
     """Samples of ``path`` at path parameters ``s`` (N,) in [0, path.length].
 
-    Raises InfeasibleError where the path stands still or doubles back (no direction of travel there).
+    Raises InfeasibleError where the path stands still or doubles back (no direction of travel
+    there).
     """
     return sample_at(path, s, path.locate(s))
 
@@ -72,7 +77,8 @@ def sample_at(path: Path, s: Array, u: Array) -> PathSamples:
 
 
 def _by_path_parameter(s: Array, c1: Array, c2: Array, c3: Array) -> tuple[Array, Array, Array]:
-    """First to third derivative along s of coordinates whose derivatives along u are c1, c2, c3 (N, D)."""
+    """First to third derivative along s of coordinates whose derivatives along u are c1, c2, c3 (N,
+    D)."""
     g = np.sqrt(np.sum(c1**2, axis=1))
     scale = float(np.max(g)) if len(g) else 0.0
     if not scale > 0 or np.any(g < _STANDS * scale):
@@ -103,14 +109,23 @@ def along_tangent(s: Array, u: Array, p: list[Array]) -> PathSamples:
     zero, one = np.zeros_like(kappa), np.ones_like(kappa)
     yaw = np.unwrap(np.arctan2(t[:, 1], t[:, 0]))
     return PathSamples(
-        s, u, p[0], yaw, t,
-        np.column_stack([one, zero, kappa]), np.column_stack([zero, zero, kappa1]),
+        s,
+        u,
+        p[0],
+        yaw,
+        t,
+        np.column_stack([one, zero, kappa]),
+        np.column_stack([zero, zero, kappa1]),
         np.column_stack([zero, kappa, kappa_v]),
-        np.column_stack([-t[:, 2], zero, -level]), kappa, np.arcsin(np.clip(t[:, 2], -1.0, 1.0)),
+        np.column_stack([-t[:, 2], zero, -level]),
+        kappa,
+        np.arcsin(np.clip(t[:, 2], -1.0, 1.0)),
     )
 
 
-def _free_heading(s: Array, u: Array, p: list[Array], yaw: list[Array], length: float) -> PathSamples:
+def _free_heading(
+    s: Array, u: Array, p: list[Array], yaw: list[Array], length: float
+) -> PathSamples:
     """Heading of its own, on level ground: the planar motion of an omnidirectional robot."""
     stacked = [np.column_stack([p[k][:, :2], length * yaw[k]]) for k in range(4)]
     d1, d2, _ = _by_path_parameter(s, stacked[1], stacked[2], stacked[3])
@@ -126,7 +141,15 @@ def _free_heading(s: Array, u: Array, p: list[Array], yaw: list[Array], length: 
     tangent = np.column_stack([d1[:, 0], d1[:, 1], zero])
     # d/ds of R(-yaw) d1 = R(-yaw) d2 - w (e_z x R(-yaw) d1)
     return PathSamples(
-        s, u, p[0], yaw[0], tangent,
-        np.column_stack([vx, vy, w]), np.column_stack([ax + w * vy, ay - w * vx, w1]),
-        np.column_stack([ax, ay, zero]), np.column_stack([zero, zero, -one]), curvature, zero,
+        s,
+        u,
+        p[0],
+        yaw[0],
+        tangent,
+        np.column_stack([vx, vy, w]),
+        np.column_stack([ax + w * vy, ay - w * vx, w1]),
+        np.column_stack([ax, ay, zero]),
+        np.column_stack([zero, zero, -one]),
+        curvature,
+        zero,
     )

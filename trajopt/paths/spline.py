@@ -1,9 +1,10 @@
 """Cubic splines through control points, as constant matrices.
 
-On fixed knots the value and every derivative of a cubic spline are linear in the control values, so one
-matrix a derivative, computed once, serves every candidate of a search: value = matrix @ control_values.
-Ends are natural (zero second derivative; thesis 000, Eqn. 4.18) or clamped (given first derivative;
-thesis 004, Appendix 1). Plain NumPy on the matrices; the same matrices multiply CasADi expressions.
+On fixed knots the value and every derivative of a cubic spline are linear in the control values, so
+one matrix a derivative, computed once, serves every candidate of a search: value = matrix @
+control_values. Ends are natural (zero second derivative; thesis 000, Eqn. 4.18) or clamped (given
+first derivative; thesis 004, Appendix 1). Plain NumPy on the matrices; the same matrices multiply
+CasADi expressions.
 """
 
 from __future__ import annotations
@@ -33,8 +34,15 @@ class SplineBasis:
 
     def __post_init__(self) -> None:
         knots = np.asarray(self.knots, dtype=np.float64)
-        if knots.ndim != 1 or knots.size < 2 or not np.all(np.isfinite(knots)) or np.any(np.diff(knots) <= 0):
-            raise ArgumentError("knots", self.knots, "at least two finite, strictly increasing knots")
+        if (
+            knots.ndim != 1
+            or knots.size < 2
+            or not np.all(np.isfinite(knots))
+            or np.any(np.diff(knots) <= 0)
+        ):
+            raise ArgumentError(
+                "knots", self.knots, "at least two finite, strictly increasing knots"
+            )
 
     @property
     def size(self) -> int:
@@ -48,8 +56,8 @@ class SplineBasis:
     def second_derivatives(self) -> Array:
         """(K, size): second derivatives at the knots = matrix @ control values.
 
-        The tridiagonal system of every cubic-spline text: continuity of the first derivative inside,
-        one end condition at each side.
+        The tridiagonal system of every cubic-spline text: continuity of the first derivative
+        inside, one end condition at each side.
         """
         k, h, n = len(self.knots), np.diff(self._knots), self.size
         left, right = np.zeros((k, k)), np.zeros((k, n))
@@ -68,10 +76,11 @@ class SplineBasis:
         return np.asarray(np.linalg.solve(left, right))
 
     def matrix(self, u: Array, derivative: int = 0) -> Array:
-        """(N, size): the spline's derivative of order 0..3 at parameters ``u`` (N,) = matrix @ values.
+        """(N, size): the spline's derivative of order 0..3 at parameters ``u`` (N,) = matrix @
+        values.
 
-        At a knot the third derivative is that of the segment to the right (of the last, at the end).
-        Parameters beyond the ends continue the first and last cubic.
+        At a knot the third derivative is that of the segment to the right (of the last, at the
+        end). Parameters beyond the ends continue the first and last cubic.
         """
         if derivative not in (0, 1, 2, 3):
             raise ArgumentError("derivative", derivative, "an order from 0 to 3")
@@ -97,18 +106,23 @@ class SplineBasis:
         return result
 
     def polynomials(self, values: Array) -> Array:
-        """(K - 1, 4, ...): coefficients of 1, t, t^2, t^3 on each segment, t counted from its left knot.
+        """(K - 1, 4, ...): coefficients of 1, t, t^2, t^3 on each segment, t counted from its left
+        knot.
 
-        ``values`` (size, ...) are control values. For repeated evaluation; the same spline as ``matrix``.
+        ``values`` (size, ...) are control values. For repeated evaluation; the same spline as
+        ``matrix``.
         """
         left = self._knots[:-1]
-        parts = [self.matrix(left, k) @ values / f for k, f in ((0, 1.0), (1, 1.0), (2, 2.0), (3, 6.0))]
+        parts = [
+            self.matrix(left, k) @ values / f for k, f in ((0, 1.0), (1, 1.0), (2, 2.0), (3, 6.0))
+        ]
         return np.stack(parts, axis=1)
 
 
 @lru_cache(maxsize=32)
 def uniform_basis(points: int) -> SplineBasis:
-    """Natural spline on knots 1, 2, ..., ``points``: thesis 000's parametrisation for four points."""
+    """Natural spline on knots 1, 2, ..., ``points``: thesis 000's parametrisation for four
+    points."""
     return SplineBasis(tuple(float(i) for i in range(1, points + 1)))
 
 
@@ -120,6 +134,9 @@ def chord_length_knots(points: Array) -> tuple[float, ...]:
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if np.any(chords <= 0):
         where = int(np.argmin(chords))
-        raise ArgumentError(f"points[{where + 1}]", points[where + 1].tolist(),
-                            f"a point different from points[{where}]: a path cannot stand still")
+        raise ArgumentError(
+            f"points[{where + 1}]",
+            points[where + 1].tolist(),
+            f"a point different from points[{where}]: a path cannot stand still",
+        )
     return tuple(np.concatenate([[0.0], np.cumsum(chords)]).tolist())

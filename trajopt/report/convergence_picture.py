@@ -15,7 +15,11 @@ Array = NDArray[np.float64]
 
 _DECADES = 1.0  # an axis is logarithmic where its values span more decades than this, chosen
 _FLOOR = 1e-16  # smallest cost drawn on a logarithmic axis: rounding of doubles
-_WORDS = {Status.EVALUATIONS: "budget used up", Status.SECONDS: "time used up", Status.NO_EXACT: "none exact"}
+_WORDS = {
+    Status.EVALUATIONS: "budget used up",
+    Status.SECONDS: "time used up",
+    Status.NO_EXACT: "none exact",
+}
 
 
 def convergence_figure(solution: Solution) -> Figure:
@@ -30,8 +34,13 @@ def convergence_figure(solution: Solution) -> Figure:
     feasible = history.violation <= FEASIBLE
     timed = solution.problem.objective.kind == "duration"
     if timed:  # where wheel angles miss, searches rank by violation, and the cost is no duration
-        drawn = _curve(cost, solution, np.where(feasible, history.cost, np.nan), feasible,
-                       search.fun if search.violation <= FEASIBLE else np.inf)
+        drawn = _curve(
+            cost,
+            solution,
+            np.where(feasible, history.cost, np.nan),
+            feasible,
+            search.fun if search.violation <= FEASIBLE else np.inf,
+        )
     else:
         drawn = _curve(cost, solution, history.cost, feasible, search.fun)
     _log_where_wide(cost, drawn)
@@ -49,8 +58,10 @@ def convergence_figure(solution: Solution) -> Figure:
     else:
         lowest.set_xlim(0, max(search.nfev, 1) * 1.08 + 1)
         lowest.xaxis.get_major_locator().set_params(integer=True)
-    cost.set_title(f"{solution.problem.title}: {search.optimizer}, {_final(solution)}{search.nfev} evaluations, "
-                   f"{_WORDS.get(search.status, search.status.name.lower())}")
+    cost.set_title(
+        f"{solution.problem.title}: {search.optimizer}, {_final(solution)}{search.nfev} evaluations, "
+        f"{_WORDS.get(search.status, search.status.name.lower())}"
+    )
     _legend(figure)
     return figure
 
@@ -60,31 +71,67 @@ def _final(solution: Solution) -> str:
     return f"cost {solution.cost:.3g}{unit}, " if np.isfinite(solution.cost) else ""
 
 
-def _curve(axes: Axes, solution: Solution, values: Array, feasible: NDArray[np.bool_], final: float) -> Array:
-    """Staircase of the best so far, dashed while infeasible, and the recomputed final value; what was drawn."""
+def _curve(
+    axes: Axes, solution: Solution, values: Array, feasible: NDArray[np.bool_], final: float
+) -> Array:
+    """Staircase of the best so far, dashed while infeasible, and the recomputed final value; what
+    was drawn."""
     history, nfev = solution.search.history, solution.search.nfev
     kept = np.isfinite(values)
     count, best, good = history.evaluations[kept], values[kept], feasible[kept]
     drawn = [*best, *([final] if np.isfinite(final) else [])]
     wide = _is_wide(np.array(drawn))
     floor = _FLOOR if wide else -np.inf
-    for wanted, dash, name in ((False, (0, (3, 1.5)), "best so far, infeasible"), (True, "-", "best so far")):
+    for wanted, dash, name in (
+        (False, (0, (3, 1.5)), "best so far, infeasible"),
+        (True, "-", "best so far"),
+    ):
         chosen = np.flatnonzero(good == wanted)
         if not len(chosen):
             continue
         after = chosen[-1] + 1
         x = [*count[chosen], count[after] if after < len(count) else max(nfev, count[-1])]
         y = np.maximum([*best[chosen], best[chosen[-1]]], floor)
-        axes.plot(x, y, drawstyle="steps-post", color=BLUE if wanted else ORANGE, linestyle=dash, label=name)
+        axes.plot(
+            x,
+            y,
+            drawstyle="steps-post",
+            color=BLUE if wanted else ORANGE,
+            linestyle=dash,
+            label=name,
+        )
         if len(chosen) <= 40:
-            axes.plot(x[:-1], y[:-1], linestyle="none", marker="o", markersize=3.5, color=BLUE if wanted else ORANGE)
+            axes.plot(
+                x[:-1],
+                y[:-1],
+                linestyle="none",
+                marker="o",
+                markersize=3.5,
+                color=BLUE if wanted else ORANGE,
+            )
     if np.isfinite(final):
-        axes.plot([nfev], [max(final, floor)], linestyle="none", marker="D", markersize=6, color=VERMILION,
-                  markeredgecolor="white", markeredgewidth=0.8, zorder=3, clip_on=False,
-                  label="recomputed for the report")
+        axes.plot(
+            [nfev],
+            [max(final, floor)],
+            linestyle="none",
+            marker="D",
+            markersize=6,
+            color=VERMILION,
+            markeredgecolor="white",
+            markeredgewidth=0.8,
+            zorder=3,
+            clip_on=False,
+            label="recomputed for the report",
+        )
     if not drawn:
-        axes.text(0.5, 0.5, "no feasible candidate with a finite value", transform=axes.transAxes,
-                  ha="center", color=GREY)
+        axes.text(
+            0.5,
+            0.5,
+            "no feasible candidate with a finite value",
+            transform=axes.transAxes,
+            ha="center",
+            color=GREY,
+        )
     return np.array(drawn)
 
 
@@ -92,7 +139,9 @@ def _is_wide(values: Array) -> bool:
     positive = values[values > 0]
     if not positive.size:
         return False
-    return bool(values.max() > 10**_DECADES * max(values.min(), _FLOOR)) or bool(values.max() < 1e-3)
+    return bool(values.max() > 10**_DECADES * max(values.min(), _FLOOR)) or bool(
+        values.max() < 1e-3
+    )
 
 
 def _log_where_wide(axes: Axes, values: Array) -> None:
@@ -113,7 +162,10 @@ def _log_where_wide(axes: Axes, values: Array) -> None:
 
 def _legend(figure: Figure) -> None:
     """One legend below for all panels."""
-    found = {label: handle for axes in figure.axes for handle, label in zip(*axes.get_legend_handles_labels(),
-                                                                           strict=True)}
+    found = {
+        label: handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
     if found:
         figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=3)

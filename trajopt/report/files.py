@@ -20,20 +20,26 @@ def write_text(file: FilePath, text: str) -> None:
 
 def write_json(file: FilePath, content: dict[str, Any]) -> None:
     """Write JSON, indented; numbers that are not finite become null."""
-    write_text(file, json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    write_text(
+        file, json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    )
 
 
 def read_json(file: FilePath) -> dict[str, Any]:
-    """The object in a JSON file. Raises ArgumentError for a file that is missing or holds something else."""
+    """The object in a JSON file. Raises ArgumentError for a file that is missing or holds something
+    else."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise ArgumentError("folder", str(file.parent), f"a folder with {file.name}, written by solve --out"
-                            ) from None
+        raise ArgumentError(
+            "folder", str(file.parent), f"a folder with {file.name}, written by solve --out"
+        ) from None
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise ArgumentError(str(file), str(error), "valid JSON, as solve --out writes it") from None
     if not isinstance(content, dict):
-        raise ArgumentError(str(file), type(content).__name__, "a JSON object, as solve --out writes it")
+        raise ArgumentError(
+            str(file), type(content).__name__, "a JSON object, as solve --out writes it"
+        )
     return content
 
 
@@ -56,21 +62,30 @@ def made_folder(folder: str | FilePath) -> FilePath:
     try:
         place.mkdir(parents=True, exist_ok=True)
     except (FileExistsError, NotADirectoryError):
-        raise ArgumentError("folder", str(folder), "a folder, or a name that is not taken by a file") from None
+        raise ArgumentError(
+            "folder", str(folder), "a folder, or a name that is not taken by a file"
+        ) from None
     except PermissionError:
         raise ArgumentError("folder", str(folder), "a folder that you may write to") from None
     return place
 
 
 def as_toml(table: dict[str, Any]) -> str:
-    """TOML text of nested tables with strings, booleans, numbers and arrays (inline where they hold tables)."""
+    """TOML text of nested tables with strings, booleans, numbers and arrays (inline where they hold
+    tables)."""
     return "\n".join(_lines(table, ())).strip() + "\n"
 
 
 def _lines(table: dict[str, Any], place: tuple[str, ...]) -> list[str]:
     values = [f"{_key(k)} = {_value(v)}" for k, v in table.items() if not isinstance(v, dict)]
-    head = ["", f"[{'.'.join(_key(part) for part in place)}]"] if place and (values or not table) else []
-    nested = [line for k, v in table.items() if isinstance(v, dict) for line in _lines(v, (*place, k))]
+    head = (
+        ["", f"[{'.'.join(_key(part) for part in place)}]"]
+        if place and (values or not table)
+        else []
+    )
+    nested = [
+        line for k, v in table.items() if isinstance(v, dict) for line in _lines(v, (*place, k))
+    ]
     return [*head, *values, *nested]
 
 

@@ -1,4 +1,5 @@
-"""The planned path: control points, robot outlines along it, navigation space, obstacle, what was explored."""
+"""The planned path: control points, robot outlines along it, navigation space, obstacle, what was
+explored."""
 
 from __future__ import annotations
 
@@ -17,7 +18,18 @@ from trajopt.report.ground_plan import (
     obstacle_strip,
     outline,
 )
-from trajopt.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION, WIDTH, new_figure
+from trajopt.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    WIDTH,
+    new_figure,
+)
 from trajopt.robots.catalogue import robot_named
 
 Array = NDArray[np.float64]
@@ -55,7 +67,11 @@ def path_figure(solution: Solution) -> Figure:
 
 def _title(solution: Solution) -> str:
     found = f"{solution.search.optimizer}, cost {solution.cost:.3g}"
-    timed = "no motion keeps the limits" if solution.trajectory is None else f"{solution.duration:.2f} s"
+    timed = (
+        "no motion keeps the limits"
+        if solution.trajectory is None
+        else f"{solution.duration:.2f} s"
+    )
     return f"{solution.problem.title}: {found}, {timed}"
 
 
@@ -80,17 +96,44 @@ def _draw_explored(axes: Axes, solution: Solution) -> None:
         if f"{point}.x_m" not in names:
             continue
         i = names.index(f"{point}.x_m")
-        axes.scatter(samples[:, i], samples[:, i + 1], s=9, marker="o", linewidths=0, color=colour, alpha=alpha,
-                     zorder=1.5)
-        axes.scatter([], [], s=16, color=colour, alpha=0.7, linewidths=0,
-                     label=f"explored {point.upper()} ({len(solution.search.history.samples)})")
+        axes.scatter(
+            samples[:, i],
+            samples[:, i + 1],
+            s=9,
+            marker="o",
+            linewidths=0,
+            color=colour,
+            alpha=alpha,
+            zorder=1.5,
+        )
+        axes.scatter(
+            [],
+            [],
+            s=16,
+            color=colour,
+            alpha=0.7,
+            linewidths=0,
+            label=f"explored {point.upper()} ({len(solution.search.history.samples)})",
+        )
 
 
 def _draw_control_points(axes: Axes, solution: Solution) -> None:
     points = solution.control_points
-    axes.plot(points[:, 0], points[:, 1], color=GREY, linewidth=0.8, linestyle=(0, (2, 2)), zorder=2.7)
-    axes.plot(points[:, 0], points[:, 1], linestyle="none", marker="o", markersize=5.5, color=ORANGE,
-              markeredgecolor=BLACK, markeredgewidth=0.7, zorder=3.0, label="control points")
+    axes.plot(
+        points[:, 0], points[:, 1], color=GREY, linewidth=0.8, linestyle=(0, (2, 2)), zorder=2.7
+    )
+    axes.plot(
+        points[:, 0],
+        points[:, 1],
+        linestyle="none",
+        marker="o",
+        markersize=5.5,
+        color=ORANGE,
+        markeredgecolor=BLACK,
+        markeredgewidth=0.7,
+        zorder=3.0,
+        label="control points",
+    )
     for i, point in enumerate(points):
         mark_pose(axes, point, f"P{i}", (0.0, 11.0))
 

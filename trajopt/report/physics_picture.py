@@ -34,7 +34,8 @@ Array = NDArray[np.float64]
 
 
 def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
-    """Path above (m); position (mm), yaw (mrad) and wheel angle errors (mrad), simulated minus planned, below.
+    """Path above (m); position (mm), yaw (mrad) and wheel angle errors (mrad), simulated minus
+    planned, below.
 
     Raises ArgumentError for a solution without a trajectory.
     """
@@ -43,10 +44,14 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
         raise ArgumentError("solution", solution.status, "a solution with a trajectory")
     times, end = recording.times, trajectory.duration
     error = 1e3 * (recording.pose - report.planned)
-    planned_wheels = (np.asarray(solution.problem.start.wheels)
-                      + trajectory.at(np.minimum(times, end)).wheel_angles)
+    planned_wheels = (
+        np.asarray(solution.problem.start.wheels)
+        + trajectory.at(np.minimum(times, end)).wheel_angles
+    )
     figure = new_figure(9.0)
-    panels: list[Axes] = list(figure.subplots(4, 1, gridspec_kw={"height_ratios": [3.4, 1.2, 1.0, 1.3]}))
+    panels: list[Axes] = list(
+        figure.subplots(4, 1, gridspec_kw={"height_ratios": [3.4, 1.2, 1.0, 1.3]})
+    )
     _draw_paths(panels[0], solution, report)
     panels[1].plot(times, error[:, 0], color=BLUE, label="x")
     panels[1].plot(times, error[:, 1], color=VERMILION, label="y")
@@ -55,16 +60,27 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
     panels[2].plot(times, error[:, 2], color=BLACK)
     panels[2].set_ylabel("yaw error (mrad)")
     for i, name in enumerate(wheel_names(planned_wheels.shape[1])):
-        panels[3].plot(times, 1e3 * (recording.wheel_angles[:, i] - planned_wheels[:, i]), linewidth=1.1,
-                       color=WHEEL_COLOURS[i % 4], linestyle=WHEEL_DASHES[i % 4], label=name)
+        panels[3].plot(
+            times,
+            1e3 * (recording.wheel_angles[:, i] - planned_wheels[:, i]),
+            linewidth=1.1,
+            color=WHEEL_COLOURS[i % 4],
+            linestyle=WHEEL_DASHES[i % 4],
+            label=name,
+        )
     panels[3].set_ylabel("wheel error (mrad)")
     panels[3].set_xlabel("time (s)")
     for axes in panels[1:]:
         axes.set_xlim(times[0], times[-1])
         axes.axhline(0.0, color=LIGHT, linewidth=0.8, zorder=0.8)
         if times[-1] > end + 1e-9:
-            axes.axvline(end, color=GREY, linestyle="--", linewidth=0.9,
-                         label="end of the plan" if axes is panels[1] else None)
+            axes.axvline(
+                end,
+                color=GREY,
+                linestyle="--",
+                linewidth=0.9,
+                label="end of the plan" if axes is panels[1] else None,
+            )
         legend_beside(axes)
     for axes in panels[1:-1]:
         axes.tick_params(labelbottom=False)
@@ -78,9 +94,16 @@ def _draw_paths(axes: Axes, solution: Solution, report: ValidationReport) -> Non
     draw_robot(axes, robot, report.planned[0], GREEN, strong=True, label="start")
     draw_robot(axes, robot, planned, GREY, strong=True, label="end, planned")
     draw_robot(axes, robot, final, VERMILION, strong=True, label="end, simulated")
-    axes.plot(report.planned[:, 0], report.planned[:, 1], color=GREY, linewidth=2.6, label="path, planned")
+    axes.plot(
+        report.planned[:, 0], report.planned[:, 1], color=GREY, linewidth=2.6, label="path, planned"
+    )
     axes.plot(pose[:, 0], pose[:, 1], color=VERMILION, linewidth=1.3, label="path, simulated")
-    frame_points(axes, np.vstack([pose[:, :2], *(outline(robot, p) for p in (report.planned[0], planned, final))]))
-    axes.set_title(f"{solution.problem.title}: simulated in {report.engine}\nfinal position off by "
-                   f"{1e3 * report.final_distance:.1f} mm, yaw by {1e3 * report.yaw:.1f} mrad")
+    frame_points(
+        axes,
+        np.vstack([pose[:, :2], *(outline(robot, p) for p in (report.planned[0], planned, final))]),
+    )
+    axes.set_title(
+        f"{solution.problem.title}: simulated in {report.engine}\nfinal position off by "
+        f"{1e3 * report.final_distance:.1f} mm, yaw by {1e3 * report.yaw:.1f} mrad"
+    )
     legend_beside(axes)

@@ -19,21 +19,27 @@ if TYPE_CHECKING:
 
 
 def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath, ...]:
-    """Draw path.png, convergence.png and, for a solution with a trajectory, profile.png. Returns the files.
+    """Draw path.png, convergence.png and, for a solution with a trajectory, profile.png. Returns
+    the files.
 
     Raises ArgumentError where the folder cannot be written.
     """
     place = made_folder(folder)
     with in_style():
-        files = [save_figure(path_figure(solution), place / "path.png"),
-                 save_figure(convergence_figure(solution), place / "convergence.png")]
+        files = [
+            save_figure(path_figure(solution), place / "path.png"),
+            save_figure(convergence_figure(solution), place / "convergence.png"),
+        ]
         if solution.trajectory is not None:
-            files.append(save_figure(profile_figure(solution, solution.trajectory), place / "profile.png"))
+            files.append(
+                save_figure(profile_figure(solution, solution.trajectory), place / "profile.png")
+            )
     return tuple(files)
 
 
-def save_physics_picture(solution: Solution, report: ValidationReport,
-                         folder: str | FilePath) -> tuple[FilePath, ...]:
+def save_physics_picture(
+    solution: Solution, report: ValidationReport, folder: str | FilePath
+) -> tuple[FilePath, ...]:
     """Draw physics.png and, where the engine made a picture, engine.png. Returns the files.
 
     Raises ArgumentError for a solution without a trajectory or a folder that cannot be written.

@@ -1,4 +1,5 @@
-"""Pictures of PowerBot's plans: path with speed, profile against limits, safe speeds, a replanned run."""
+"""Pictures of PowerBot's plans: path with speed, profile against limits, safe speeds, a replanned
+run."""
 
 from __future__ import annotations
 
@@ -32,14 +33,18 @@ _RANGES = np.linspace(0.6, 6.0, 60)  # m, sonar settings to modest laser ranges
 _DELAYS = (0.1, 0.2, 0.5, 1.0)  # s
 
 
-def draw_path(trajectory: Trajectory, file: str | FilePath, *, knots: Sequence[Sequence[float]] = ()) -> FilePath:
+def draw_path(
+    trajectory: Trajectory, file: str | FilePath, *, knots: Sequence[Sequence[float]] = ()
+) -> FilePath:
     """Path from above, coloured by planned speed; knots as dots. Returns ``file``."""
     with in_style():
         figure = new_figure(4.6)
         axes = figure.add_subplot()
         state = trajectory.at(np.linspace(0, trajectory.duration, _POINTS))
         xy = state.pose[:, :2]
-        lines = LineCollection(np.stack([xy[:-1], xy[1:]], axis=1).tolist(), cmap="viridis", linewidths=3)
+        lines = LineCollection(
+            np.stack([xy[:-1], xy[1:]], axis=1).tolist(), cmap="viridis", linewidths=3
+        )
         lines.set_array(state.twist[:-1, 0])
         axes.add_collection(lines)
         if len(knots):
@@ -54,7 +59,8 @@ def draw_path(trajectory: Trajectory, file: str | FilePath, *, knots: Sequence[S
 
 
 def draw_profiles(plans: Sequence[tuple[str, Trajectory]], file: str | FilePath) -> FilePath:
-    """Speed over the path of several plans; below, which limit binds in the last one. Returns ``file``."""
+    """Speed over the path of several plans; below, which limit binds in the last one. Returns
+    ``file``."""
     with in_style():
         figure = new_figure(4.2)
         speed, binding = figure.subplots(2, 1, sharex=True, height_ratios=[5, 1])
@@ -68,47 +74,76 @@ def draw_profiles(plans: Sequence[tuple[str, Trajectory]], file: str | FilePath)
         for part in last.active:
             label = None if part.limit in shown else part.limit
             shown.add(part.limit)
-            binding.axvspan(part.start, part.end, color=limit_colour(part.limit, names.index(part.limit)), label=label,
-                            lw=0)
+            binding.axvspan(
+                part.start,
+                part.end,
+                color=limit_colour(part.limit, names.index(part.limit)),
+                label=label,
+                lw=0,
+            )
         binding.set(xlabel="path parameter s, m", yticks=[], title=f"Binding limit, {plans[-1][0]}")
         legend_beside(binding)
         return save_figure(figure, FilePath(file))
 
 
 def draw_safe_speed(file: str | FilePath, *, braking: float, robot_speed: float) -> FilePath:
-    """Safe speed over sensor range for several delays, ``braking`` in m/s^2; the thesis's rule dashed."""
+    """Safe speed over sensor range for several delays, ``braking`` in m/s^2; the thesis's rule
+    dashed."""
     with in_style():
         figure = new_figure(3.6)
         axes = figure.add_subplot()
         for delay, colour in zip(_DELAYS, (BLUE, SKY, GREEN, ORANGE), strict=True):
-            axes.plot(_RANGES, [safe_speed(float(r), delay, braking) for r in _RANGES], color=colour,
-                      label=f"delay {delay:g} s")
-        axes.plot(_RANGES, _RANGES / _DELAYS[-1], "--", color=VERMILION, label="thesis, 1 s: no braking distance")
+            axes.plot(
+                _RANGES,
+                [safe_speed(float(r), delay, braking) for r in _RANGES],
+                color=colour,
+                label=f"delay {delay:g} s",
+            )
+        axes.plot(
+            _RANGES,
+            _RANGES / _DELAYS[-1],
+            "--",
+            color=VERMILION,
+            label="thesis, 1 s: no braking distance",
+        )
         axes.axhline(robot_speed, color=GREY, lw=0.8, label="robot's top speed")
-        axes.set(xlabel="sensor range, m", ylabel="speed, m/s", ylim=(0, 2.2 * robot_speed),
-                 title=f"Speed from which the robot stops in sight, braking {braking:.2f} m/s²")
+        axes.set(
+            xlabel="sensor range, m",
+            ylabel="speed, m/s",
+            ylim=(0, 2.2 * robot_speed),
+            title=f"Speed from which the robot stops in sight, braking {braking:.2f} m/s²",
+        )
         legend_beside(axes)
         return save_figure(figure, FilePath(file))
 
 
-def draw_replan(run: Run, where: Course, file: str | FilePath, *, free: Run | None = None) -> FilePath:
-    """Speed and distance to the nearest obstacle over time; ``free`` is the same run without obstacles."""
+def draw_replan(
+    run: Run, where: Course, file: str | FilePath, *, free: Run | None = None
+) -> FilePath:
+    """Speed and distance to the nearest obstacle over time; ``free`` is the same run without
+    obstacles."""
     with in_style():
         figure: Figure = new_figure(4.4)
         speed, gap = figure.subplots(2, 1, sharex=True)
         if free is not None:
-            speed.plot(free.times, free.v, color=GREY, lw=1.0, label=f"way free, {_arrival(free):.1f} s")
+            speed.plot(
+                free.times, free.v, color=GREY, lw=1.0, label=f"way free, {_arrival(free):.1f} s"
+            )
         speed.plot(run.times, run.v, color=BLUE, label=f"with obstacles, {_arrival(run):.1f} s")
         speed.set(ylabel="speed, m/s", title="Replanned motion")
         seen = np.isfinite(run.gap)
         stop = run.v**2 / (2 * np.interp(run.s, where.s, where.braking))
-        gap.plot(run.times, np.where(seen, run.gap, np.nan), color=VERMILION, label="nearest obstacle")
+        gap.plot(
+            run.times, np.where(seen, run.gap, np.nan), color=VERMILION, label="nearest obstacle"
+        )
         gap.plot(run.times, stop, color=GREEN, label="braking distance")
         gap.set(xlabel="time, s", ylabel="distance, m", ylim=(0, None))
         for axes in (speed, gap):
             edges = np.flatnonzero(np.diff(np.concatenate([[False], seen, [False]]).astype(int)))
             for first, end in zip(edges[::2], edges[1::2], strict=True):
-                axes.axvspan(run.times[first], run.times[min(end, len(run.times) - 1)], color="#f3e3d8", lw=0)
+                axes.axvspan(
+                    run.times[first], run.times[min(end, len(run.times) - 1)], color="#f3e3d8", lw=0
+                )
             legend_beside(axes)
         return save_figure(figure, FilePath(file))
 

@@ -27,19 +27,27 @@ def versions() -> dict[str, str]:
 
 
 def commit() -> str | None:
-    """Commit of the checkout that this package runs from, "+changes" behind it where files differ; else None."""
+    """Commit of the checkout that this package runs from, "+changes" behind it where files differ;
+    else None."""
     package = FilePath(trajopt.__file__).parent
     head = _git(package, "rev-parse", "HEAD")
-    # An installed copy may lie inside somebody else's checkout: ask whether git knows this very file.
+    # An installed copy may lie inside somebody else's checkout: ask whether git knows this very
+    # file.
     if head is None or _git(package, "ls-files", "--error-unmatch", "__init__.py") is None:
         return None
-    return head + ("+changes" if _git(package, "status", "--porcelain", "--untracked-files=no", ".") else "")
+    return head + (
+        "+changes" if _git(package, "status", "--porcelain", "--untracked-files=no", ".") else ""
+    )
 
 
 def run_facts() -> dict[str, Any]:
     """Time and machine: what differs between equal runs."""
-    return {"written": datetime.now(UTC).isoformat(timespec="seconds"), "host": platform.node(),
-            "system": platform.platform(), "processor": _processor()}
+    return {
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "host": platform.node(),
+        "system": platform.platform(),
+        "processor": _processor(),
+    }
 
 
 def _processor() -> str:
@@ -53,8 +61,13 @@ def _processor() -> str:
 
 def _git(folder: FilePath, *arguments: str) -> str | None:
     try:
-        done = subprocess.run(["git", "-C", str(folder), *arguments], capture_output=True, text=True,
-                              timeout=10, check=False)
+        done = subprocess.run(
+            ["git", "-C", str(folder), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=False,
+        )
     except (OSError, subprocess.TimeoutExpired):
         return None
     return done.stdout.strip() if done.returncode == 0 else None

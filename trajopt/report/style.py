@@ -20,21 +20,24 @@ BLACK, GREY, LIGHT = "#000000", "#6b6b6b", "#c9c9c9"
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 
-# Wheels in the order of every per-wheel array: colour tells left from right, the dash front from rear.
+# Wheels in the order of every per-wheel array: colour tells left from right, the dash front from
+# rear.
 WHEEL_COLOURS = (BLUE, VERMILION, BLUE, VERMILION)
 WHEEL_DASHES = ("-", "-", (0, (4, 1.5)), (0, (4, 1.5)))
 
-LIMIT_COLOURS: Mapping[str, str] = MappingProxyType({
-    "speed": BLUE,
-    "acceleration": ORANGE,
-    "wheel_speed": GREEN,
-    "wheel_acceleration": PURPLE,
-    "slip": VERMILION,
-    "tip": BLACK,
-    "yaw_rate": SKY,
-    "speed_profile": YELLOW,
-    "speed_zones": YELLOW,
-})
+LIMIT_COLOURS: Mapping[str, str] = MappingProxyType(
+    {
+        "speed": BLUE,
+        "acceleration": ORANGE,
+        "wheel_speed": GREEN,
+        "wheel_acceleration": PURPLE,
+        "slip": VERMILION,
+        "tip": BLACK,
+        "yaw_rate": SKY,
+        "speed_profile": YELLOW,
+        "speed_zones": YELLOW,
+    }
+)
 _SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed
 
 RESOLUTION = 160  # dots an inch, chosen: sharp on a screen, 1100 pixels for a full-width figure
@@ -71,7 +74,8 @@ _RC: Any = {
 
 
 def in_style() -> Any:
-    """Context in which figures are drawn and saved; matplotlib's settings are as before afterwards."""
+    """Context in which figures are drawn and saved; matplotlib's settings are as before
+    afterwards."""
     return mpl.rc_context(_RC)
 
 
@@ -99,4 +103,11 @@ def legend_beside(axes: Axes, **options: Any) -> None:
     """Legend to the right of the axes, where it covers nothing; nothing for axes without labels."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
-        axes.legend(handles, labels, loc="upper left", bbox_to_anchor=(1.0, 1.02), borderaxespad=0.2, **options)
+        axes.legend(
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(1.0, 1.02),
+            borderaxespad=0.2,
+            **options,
+        )

@@ -31,13 +31,17 @@ _MOST_ARRAYS, _MOST_LINES = 8, 8  # panels of arrays.png and lines in one of the
 Array = NDArray[np.float64]
 
 
-def report_case(store: Store, prefix: str, folder: str | FilePath, plan: SweepPlan | None = None) -> list[FilePath]:
-    """Write what there is to see of the one case whose identity starts with ``prefix``; returns the files.
+def report_case(
+    store: Store, prefix: str, folder: str | FilePath, plan: SweepPlan | None = None
+) -> list[FilePath]:
+    """Write what there is to see of the one case whose identity starts with ``prefix``; returns the
+    files.
 
-    ``case.json`` and, for arrays beside the row, ``<name>.csv`` and ``arrays.png``. With ``plan``, a finished case of
-    a problem file is solved again (the same seed, so the same result) and gets the run folder and the pictures of
-    ``trajopt solve``, and of ``trajopt validate`` where its row was driven. Raises StoreError for a case that is not
-    there, ArgumentError for a plan that is another one's, or whose code now finds another cost.
+    ``case.json`` and, for arrays beside the row, ``<name>.csv`` and ``arrays.png``. With ``plan``,
+    a finished case of a problem file is solved again (the same seed, so the same result) and gets
+    the run folder and the pictures of ``trajopt solve``, and of ``trajopt validate`` where its row
+    was driven. Raises StoreError for a case that is not there, ArgumentError for a plan that is
+    another one's, or whose code now finds another cost.
     """
     row, arrays = store.case(prefix)
     place = made_folder(folder)
@@ -46,8 +50,13 @@ def report_case(store: Store, prefix: str, folder: str | FilePath, plan: SweepPl
         files += _solved_again(plan.run, _case(plan, str(row["case"])), row, place)
     elif plan is not None:
         _case(plan, str(row["case"]))
-    write_json(place / "case.json", {**{k: _plain(v) for k, v in row.items() if v is not None},
-                                     "arrays": {name: list(a.shape) for name, a in arrays.items()}})
+    write_json(
+        place / "case.json",
+        {
+            **{k: _plain(v) for k, v in row.items() if v is not None},
+            "arrays": {name: list(a.shape) for name, a in arrays.items()},
+        },
+    )
     files.append(place / "case.json")
     for name, array in arrays.items():
         table = array.reshape(len(array), -1) if array.ndim else array.reshape(1, 1)
@@ -60,20 +69,26 @@ def report_case(store: Store, prefix: str, folder: str | FilePath, plan: SweepPl
 
 
 def arrays_figure(arrays: Mapping[str, Array]) -> Figure:
-    """Each array over its first index; over a column of times of the same length, where one is there.
+    """Each array over its first index; over a column of times of the same length, where one is
+    there.
 
-    An array whose name ends in "pose" or "points" is drawn in the plane, to scale. Raises ArgumentError without arrays.
+    An array whose name ends in "pose" or "points" is drawn in the plane, to scale. Raises
+    ArgumentError without arrays.
     """
     clocks = {len(a): a for n, a in arrays.items() if n.endswith("times") and a.ndim == 1}
-    shown = [(n, a) for n, a in sorted(arrays.items()) if a.ndim and not n.endswith("times")][:_MOST_ARRAYS]
+    shown = [(n, a) for n, a in sorted(arrays.items()) if a.ndim and not n.endswith("times")][
+        :_MOST_ARRAYS
+    ]
     if not shown:
         raise ArgumentError("arrays", sorted(arrays), "at least one array besides times")
     columns = min(2, len(shown))
     rows = math.ceil(len(shown) / columns)
     figure = new_figure(0.3 + 2.6 * rows)
-    for axes, (name, array) in zip(figure.subplots(rows, columns, squeeze=False).ravel(), shown, strict=False):
+    for axes, (name, array) in zip(
+        figure.subplots(rows, columns, squeeze=False).ravel(), shown, strict=False
+    ):
         _draw(axes, name, array.reshape(len(array), -1), clocks.get(len(array)))
-    for axes in figure.axes[len(shown):]:
+    for axes in figure.axes[len(shown) :]:
         axes.set_visible(False)
     return figure
 
@@ -87,18 +102,27 @@ def _draw(axes: Axes, name: str, table: Array, clock: Array | None) -> None:
         axes.set_aspect("equal", adjustable="datalim")
         return
     for number, column in enumerate(table.T[:_MOST_LINES]):
-        axes.plot(np.arange(len(table)) if clock is None else clock, column,
-                  label=str(number) if table.shape[1] > 1 else None)
+        axes.plot(
+            np.arange(len(table)) if clock is None else clock,
+            column,
+            label=str(number) if table.shape[1] > 1 else None,
+        )
     axes.set_xlabel("index" if clock is None else "time (s)")
     legend_beside(axes)
 
 
-def _solved_again(run: ProblemRun, case: Case, row: Mapping[str, Any], place: FilePath) -> list[FilePath]:
+def _solved_again(
+    run: ProblemRun, case: Case, row: Mapping[str, Any], place: FilePath
+) -> list[FilePath]:
     """Run folder and pictures of a case that was solved."""
     solution = run.solution(case)
     if not math.isclose(solution.cost, row["cost"], rel_tol=_SAME, abs_tol=_SAME):
-        raise ArgumentError("cost", solution.cost, f"{row['cost']!r}, as the case's row says; it was run by other "
-                                                   "code (see the store's runs/*.json)")
+        raise ArgumentError(
+            "cost",
+            solution.cost,
+            f"{row['cost']!r}, as the case's row says; it was run by other "
+            "code (see the store's runs/*.json)",
+        )
     write_solution(solution, place, seed=run.seed(case), command="trajopt report")
     files = [place / "summary.json", *save_pictures(solution, place)]
     report = run.driven(case, solution)
@@ -111,8 +135,12 @@ def _solved_again(run: ProblemRun, case: Case, row: Mapping[str, Any], place: Fi
 def _case(plan: SweepPlan, identity: str) -> Case:
     places = np.flatnonzero(plan.table.ids == identity.encode())
     if not len(places):
-        raise ArgumentError("case", identity, "a case of this sweep file, problem and code version; give the store's "
-                                              "directory instead to see what is stored")
+        raise ArgumentError(
+            "case",
+            identity,
+            "a case of this sweep file, problem and code version; give the store's "
+            "directory instead to see what is stored",
+        )
     return plan.table.take(places).rows()[0]
 
 

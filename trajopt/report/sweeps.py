@@ -24,11 +24,17 @@ _MOST_POINTS = 5_000  # points drawn in one panel of pairs; chosen
 def heat_map(frame: pd.DataFrame, x: str, y: str, value: str) -> Figure:
     """Mean of ``value`` over two axes, written into the cells; finished cases only.
 
-    A cell without finished cases stays empty. Raises ArgumentError for unknown columns and empty tables.
+    A cell without finished cases stays empty. Raises ArgumentError for unknown columns and empty
+    tables.
     """
     rows = _done(frame, (x, y, value))
-    means = rows.assign(**{value: rows[value].astype(float)}).pivot_table(index=y, columns=x, values=value)
-    figure = Figure(figsize=(1.6 + 0.75 * len(means.columns), 1.4 + 0.45 * len(means.index)), layout="constrained")
+    means = rows.assign(**{value: rows[value].astype(float)}).pivot_table(
+        index=y, columns=x, values=value
+    )
+    figure = Figure(
+        figsize=(1.6 + 0.75 * len(means.columns), 1.4 + 0.45 * len(means.index)),
+        layout="constrained",
+    )
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     cells = means.to_numpy(dtype=np.float64)
@@ -41,15 +47,23 @@ def heat_map(frame: pd.DataFrame, x: str, y: str, value: str) -> Figure:
     if cells.size <= 400:
         for (row, column), cell in np.ndenumerate(cells):
             if np.isfinite(cell):
-                axes.text(column, row, f"{cell:.3g}", ha="center", va="center", fontsize=8,
-                          color="black" if cell > middle else "white")
+                axes.text(
+                    column,
+                    row,
+                    f"{cell:.3g}",
+                    ha="center",
+                    va="center",
+                    fontsize=8,
+                    color="black" if cell > middle else "white",
+                )
     figure.colorbar(image, label=f"mean {value}")
     return figure
 
 
 def lines(frame: pd.DataFrame, x: str, value: str, by: str | None = None) -> Figure:
-    """Median of ``value`` over ``x``, a line for each value of ``by``, with bands from the 10th to the 90th
-    percentile; for a value that is only 0 or 1 (or a boolean) the share of ones with Wilson's 95 % interval.
+    """Median of ``value`` over ``x``, a line for each value of ``by``, with bands from the 10th to
+    the 90th percentile; for a value that is only 0 or 1 (or a boolean) the share of ones with
+    Wilson's 95 % interval.
 
     Finished cases only. Raises ArgumentError as ``heat_map``.
     """
@@ -60,13 +74,18 @@ def lines(frame: pd.DataFrame, x: str, value: str, by: str | None = None) -> Fig
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     for name, group in [("", rows)] if by is None else list(rows.groupby(by)):
-        bands = [(place, *(_share(v) if yes_or_no else _median(v))) for place, v in group.groupby(x)[value]]
+        bands = [
+            (place, *(_share(v) if yes_or_no else _median(v)))
+            for place, v in group.groupby(x)[value]
+        ]
         places, middle, low, high = zip(*bands, strict=True)
         label = None if by is None else f"{by} = {_short(name)}"
-        line, = axes.plot(places, middle, marker="o", markersize=4, label=label)
+        (line,) = axes.plot(places, middle, marker="o", markersize=4, label=label)
         axes.fill_between(places, low, high, color=line.get_color(), alpha=0.18, linewidth=0)
     axes.set_xlabel(x)
-    axes.set_ylabel(f"{value} (share, 95 % interval)" if yes_or_no else f"{value} (median, 10-90 %)")
+    axes.set_ylabel(
+        f"{value} (share, 95 % interval)" if yes_or_no else f"{value} (median, 10-90 %)"
+    )
     axes.grid(alpha=0.3)
     if by is not None:
         axes.legend()
@@ -83,7 +102,8 @@ def _share(values: pd.Series) -> tuple[float, float, float]:
 
 
 def pairs(frame: pd.DataFrame, columns: Sequence[str]) -> Figure:
-    """Scatter of every pair of numeric columns, histograms on the diagonal. Raises ArgumentError."""
+    """Scatter of every pair of numeric columns, histograms on the diagonal. Raises
+    ArgumentError."""
     if not 2 <= len(columns) <= _MOST_PAIRS:
         raise ArgumentError("columns", list(columns), f"2 to {_MOST_PAIRS} columns")
     rows = _done(frame, columns)
@@ -106,9 +126,18 @@ def pairs(frame: pd.DataFrame, columns: Sequence[str]) -> Figure:
     return figure
 
 
-def draw(store: Path, out: Path, *, value: str = "", x: str = "", y: str = "", by: str = "",
-         pair: Sequence[str] | None = None) -> None:
-    """Save a picture of a sweep's store: x, y and value (heat map), x and value (lines), or pairs of columns.
+def draw(
+    store: Path,
+    out: Path,
+    *,
+    value: str = "",
+    x: str = "",
+    y: str = "",
+    by: str = "",
+    pair: Sequence[str] | None = None,
+) -> None:
+    """Save a picture of a sweep's store: x, y and value (heat map), x and value (lines), or pairs
+    of columns.
 
     Raises ArgumentError for any other choice of columns.
     """
@@ -120,7 +149,9 @@ def draw(store: Path, out: Path, *, value: str = "", x: str = "", y: str = "", b
     elif x and value:
         figure = lines(frame, x, value, by or None)
     else:
-        raise ArgumentError("options", None, "--x --y --value, --x --value [--by], or --pair twice or more")
+        raise ArgumentError(
+            "options", None, "--x --y --value, --x --value [--by], or --pair twice or more"
+        )
     figure.savefig(out, dpi=DOTS)
 
 

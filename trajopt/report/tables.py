@@ -29,15 +29,24 @@ def solution_table(solution: Solution) -> Table:
         table.add_row("violation", _number(search.violation))
     for i, point in enumerate(solution.control_points[1:-1], start=1):
         table.add_row(f"P{i}", f"({point[0]:.4f}, {point[1]:.4f}) m, yaw {point[2]:.4f} rad")
-    table.add_row("duration", "none" if solution.trajectory is None else f"{solution.duration:.4f} s")
+    table.add_row(
+        "duration", "none" if solution.trajectory is None else f"{solution.duration:.4f} s"
+    )
     _margin_rows(table, solution)
-    for name, value in zip(wheel_names(len(solution.dead_zone_effect)), solution.dead_zone_effect, strict=True):
+    for name, value in zip(
+        wheel_names(len(solution.dead_zone_effect)), solution.dead_zone_effect, strict=True
+    ):
         drives = solution.problem.actuator
         if drives.dead_zone > 0 and not drives.enabled and name in solution.problem.goal.critical:
-            table.add_row(f"dead-zone would add, {name}", f"{value:+.4f} rad" if np.isfinite(value) else "none")
+            table.add_row(
+                f"dead-zone would add, {name}",
+                f"{value:+.4f} rad" if np.isfinite(value) else "none",
+            )
     table.add_row("optimizer", escape(search.optimizer))
     failed = f", {search.failures} failed" if search.failures else ""
-    table.add_row("evaluations", f"{search.nfev}{failed}, {search.nit} iterations, {solution.wall_time:.2f} s")
+    table.add_row(
+        "evaluations", f"{search.nfev}{failed}, {search.nit} iterations, {solution.wall_time:.2f} s"
+    )
     verdict = "[green]holds[/green]" if solution.holds else "[red]does not hold[/red]"
     table.add_row("status", f"{verdict}: {escape(search.message)}")
     return table
@@ -49,19 +58,33 @@ def validation_table(report: ValidationReport) -> Table:
     table = _table(f"Check in {report.engine} {report.recording.version}{feedback}")
     share = 100 / report.length if report.length > 0 else np.nan
     table.add_row("path length", f"{report.length:.3f} m")
-    table.add_row("final error along", f"{1e3 * report.along:+.2f} mm ({share * report.along:+.2f} %)")
-    table.add_row("final error across", f"{1e3 * report.across:+.2f} mm ({share * report.across:+.2f} %)")
+    table.add_row(
+        "final error along", f"{1e3 * report.along:+.2f} mm ({share * report.along:+.2f} %)"
+    )
+    table.add_row(
+        "final error across", f"{1e3 * report.across:+.2f} mm ({share * report.across:+.2f} %)"
+    )
     table.add_row("final yaw error", f"{1e3 * report.yaw:+.2f} mrad")
-    table.add_row("off the path", f"rms {1e3 * report.path_rms:.2f} mm, most {1e3 * report.path_max:.2f} mm")
-    for name, value in zip(wheel_names(len(report.wheel_deviation)), report.wheel_deviation, strict=True):
+    table.add_row(
+        "off the path", f"rms {1e3 * report.path_rms:.2f} mm, most {1e3 * report.path_max:.2f} mm"
+    )
+    for name, value in zip(
+        wheel_names(len(report.wheel_deviation)), report.wheel_deviation, strict=True
+    ):
         table.add_row(f"wheel {name}", f"{1e3 * value:+.3f} mrad")
     table.add_row("real-time factor", f"{report.real_time_factor:.2f}")
     return table
 
 
 def _table(title: str) -> Table:
-    table = Table(title=escape(title), title_justify="left", title_style="bold", box=box.SIMPLE_HEAD,
-                  show_header=False, pad_edge=False)
+    table = Table(
+        title=escape(title),
+        title_justify="left",
+        title_style="bold",
+        box=box.SIMPLE_HEAD,
+        show_header=False,
+        pad_edge=False,
+    )
     table.add_column(style="dim", no_wrap=True)
     table.add_column(overflow="fold")
     return table
@@ -75,7 +98,11 @@ def _margin_rows(table: Table, solution: Solution) -> None:
     shares = binding_shares(solution.trajectory)
     for name, margin in sorted(solution.margins.items(), key=lambda item: item[1]):
         binds = f", binds {shares[name]:.0%} of the time" if name in shares else ""
-        text = f"{max(margin, 0.0):.1%}{binds}" if margin > -1e-9 else f"[red]broken by {-margin:.1%}[/red]"
+        text = (
+            f"{max(margin, 0.0):.1%}{binds}"
+            if margin > -1e-9
+            else f"[red]broken by {-margin:.1%}[/red]"
+        )
         table.add_row(f"margin {escape(name)}", text)
 
 

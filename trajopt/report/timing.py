@@ -8,7 +8,16 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from trajopt.errors import ArgumentError
-from trajopt.report.style import BLUE, GREY, ORANGE, VERMILION, in_style, legend_beside, new_figure, save_figure
+from trajopt.report.style import (
+    BLUE,
+    GREY,
+    ORANGE,
+    VERMILION,
+    in_style,
+    legend_beside,
+    new_figure,
+    save_figure,
+)
 
 _COLOURS = (BLUE, VERMILION, ORANGE)
 
@@ -20,12 +29,19 @@ def growth_exponent(points: Sequence[float], seconds: Sequence[float]) -> float:
     """
     x, y = np.asarray(points, dtype=np.float64), np.asarray(seconds, dtype=np.float64)
     if x.shape != y.shape or len(x) < 2 or not (np.all(x > 0) and np.all(y > 0)):
-        raise ArgumentError("points, seconds", (list(points), list(seconds)), "two or more pairs of positive numbers")
+        raise ArgumentError(
+            "points, seconds",
+            (list(points), list(seconds)),
+            "two or more pairs of positive numbers",
+        )
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def draw_growth(series: Mapping[str, tuple[Sequence[float], Sequence[float]]], file: str | FilePath) -> FilePath:
-    """Seconds over gridpoints, both logarithmic; ``series`` maps a name to (points, seconds). Returns ``file``.
+def draw_growth(
+    series: Mapping[str, tuple[Sequence[float], Sequence[float]]], file: str | FilePath
+) -> FilePath:
+    """Seconds over gridpoints, both logarithmic; ``series`` maps a name to (points, seconds).
+    Returns ``file``.
 
     Each is labelled with its exponent; the dashed line through the first series' last point is cost
     proportional to the number of points.
@@ -35,11 +51,28 @@ def draw_growth(series: Mapping[str, tuple[Sequence[float], Sequence[float]]], f
         axes = figure.add_subplot()
         for (name, (points, seconds)), colour in zip(series.items(), _COLOURS, strict=False):
             exponent = growth_exponent(points, seconds)
-            axes.loglog(points, 1e3 * np.asarray(seconds), "o-", ms=4, color=colour,
-                        label=f"{name}: cost ~ N^{exponent:.2f}")
+            axes.loglog(
+                points,
+                1e3 * np.asarray(seconds),
+                "o-",
+                ms=4,
+                color=colour,
+                label=f"{name}: cost ~ N^{exponent:.2f}",
+            )
         points, seconds = next(iter(series.values()))
-        axes.loglog(points, 1e3 * seconds[-1] / points[-1] * np.asarray(points), "--", color=GREY, lw=0.9, zorder=1,
-                    label="proportional to N")
-        axes.set(xlabel="gridpoints N", ylabel="time, ms", title="Cost of time scaling against the gridpoints")
+        axes.loglog(
+            points,
+            1e3 * seconds[-1] / points[-1] * np.asarray(points),
+            "--",
+            color=GREY,
+            lw=0.9,
+            zorder=1,
+            label="proportional to N",
+        )
+        axes.set(
+            xlabel="gridpoints N",
+            ylabel="time, ms",
+            title="Cost of time scaling against the gridpoints",
+        )
         legend_beside(axes)
         return save_figure(figure, FilePath(file))

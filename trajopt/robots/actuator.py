@@ -1,13 +1,13 @@
 """Wheel actuator with saturation and dead-zone (thesis 000, section 4.2.2), integrated exactly.
 
-The actuator passes a commanded wheel speed w unchanged, but gives 0 below the dead-zone and +-saturation
-beyond the saturation:
+The actuator passes a commanded wheel speed w unchanged, but gives 0 below the dead-zone and
++-saturation beyond the saturation:
 
     f(w) = 0 for |w| < dead_zone,  w for dead_zone <= |w| <= saturation,  sign(w) saturation beyond.
 
-Over a time step in which w moves linearly from w0 to w1, the mean of f is (G(w1) - G(w0))/(w1 - w0) with
-G(w) = max(min(|w|, sat)^2 - dz^2, 0)/2 + sat max(|w| - sat, 0). That form loses digits when w1 is near w0;
-the code below is the same function written with factored differences.
+Over a time step in which w moves linearly from w0 to w1, the mean of f is (G(w1) - G(w0))/(w1 - w0)
+with G(w) = max(min(|w|, sat)^2 - dz^2, 0)/2 + sat max(|w| - sat, 0). That form loses digits when w1
+is near w0; the code below is the same function written with factored differences.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ SMALL_SPAN = 1e-9  # rad/s; a step with less change of speed is taken as constan
 
 @dataclass(frozen=True)
 class Actuator:
-    """Wheel speed limits, rad/s: ``saturation`` > ``dead_zone`` >= 0. ``Actuator()`` limits nothing."""
+    """Wheel speed limits, rad/s: ``saturation`` > ``dead_zone`` >= 0. ``Actuator()`` limits
+    nothing."""
 
     saturation: float = np.inf
     dead_zone: float = 0.0
@@ -33,7 +34,9 @@ class Actuator:
         if not self.dead_zone >= 0:
             raise ArgumentError("actuator.dead_zone", self.dead_zone, "a speed >= 0 rad/s")
         if not self.saturation > self.dead_zone:
-            raise ArgumentError("actuator.saturation", self.saturation, "a speed above the dead-zone, rad/s")
+            raise ArgumentError(
+                "actuator.saturation", self.saturation, "a speed above the dead-zone, rad/s"
+            )
 
     @property
     def is_ideal(self) -> bool:
@@ -42,17 +45,21 @@ class Actuator:
     def output(self, w: Any) -> Any:
         """f(w), rad/s, elementwise."""
         magnitude = np.abs(w)
-        return np.where(magnitude < self.dead_zone, 0.0, np.sign(w) * np.minimum(magnitude, self.saturation))
+        return np.where(
+            magnitude < self.dead_zone, 0.0, np.sign(w) * np.minimum(magnitude, self.saturation)
+        )
 
     def step_mean(self, mean: Any, half_span: Any) -> Any:
-        """Mean of f over a step in which w moves linearly from mean - half_span to mean + half_span."""
+        """Mean of f over a step in which w moves linearly from mean - half_span to mean +
+        half_span."""
         if self.is_ideal:
             return mean
         low, high = mean - half_span, mean + half_span
         span = high - low
         small = np.abs(span) < SMALL_SPAN
-        return np.where(small, self.output(mean),
-                        self._integral(low, high) / np.where(small, 1.0, span))
+        return np.where(
+            small, self.output(mean), self._integral(low, high) / np.where(small, 1.0, span)
+        )
 
     def _integral(self, low: Any, high: Any) -> Any:
         """Integral of f from low to high, each difference factored so that nothing cancels."""

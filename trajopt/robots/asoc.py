@@ -1,9 +1,9 @@
 """Active split offset casters (thesis 001): module kinematics, frames, geometric constraints.
 
 A module turns by alpha about a vertical axis at the edge of the body; its axle trails the axis by
-``offset`` and carries two driven wheels ``split`` apart, which may tilt by beta about the fore-aft axis.
-alpha is the angle (rad, CCW, body frame) of the module's forward direction; wheel 1 stands on its right
-(-y), wheel 2 on its left: so eq. 18 holds as printed.
+``offset`` and carries two driven wheels ``split`` apart, which may tilt by beta about the fore-aft
+axis. alpha is the angle (rad, CCW, body frame) of the module's forward direction; wheel 1 stands on
+its right (-y), wheel 2 on its left: so eq. 18 holds as printed.
 """
 
 from __future__ import annotations
@@ -27,12 +27,15 @@ SPLIT = 0.20  # m, thesis 001 section 4.3
 OFFSET = 0.10  # m, thesis 001 section 4.3
 WHEEL_WIDTH = 0.03  # m, baseline of thesis 001's Table VI; not printed for section 4.3
 COG_HEIGHT = 0.20  # m, chosen: twice the axle height; not printed
-LEAST_ROOT = 1e-12  # m^2, of wheel_radius^2 - offset^2; below, wheel and shaft cannot meet (section 3.1.2)
+LEAST_ROOT = (
+    1e-12  # m^2, of wheel_radius^2 - offset^2; below, wheel and shaft cannot meet (section 3.1.2)
+)
 
 
 @dataclass(frozen=True)
 class AsocGeometry:
-    """Sizes of a robot on N modules, equally spaced on a circle, m. Defaults: thesis 001, section 4.3.
+    """Sizes of a robot on N modules, equally spaced on a circle, m. Defaults: thesis 001, section
+    4.3.
 
     ``module_radius``: distance of the module axes from the centre; half the body length (inferred).
     """
@@ -46,7 +49,9 @@ class AsocGeometry:
 
     def __post_init__(self) -> None:
         if self.modules < 2:
-            raise ArgumentError("modules", self.modules, "at least 2 modules: one alone cannot hold its heading")
+            raise ArgumentError(
+                "modules", self.modules, "at least 2 modules: one alone cannot hold its heading"
+            )
         for name in ("split", "offset", "wheel_radius", "wheel_width", "module_radius"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0):
@@ -69,56 +74,94 @@ class AsocGeometry:
 
 
 def module_jacobian(alpha: Any, split: Any, offset: Any, tilt: Any = 0.0) -> Array:
-    """(..., 2, 2): velocity of the module axis (body frame, m/s) = J @ (V_1, V_2), wheel speeds in m/s.
+    """(..., 2, 2): velocity of the module axis (body frame, m/s) = J @ (V_1, V_2), wheel speeds in
+    m/s.
 
-    Eq. 18, and with ``tilt`` beta (rad) the matrix of eq. 20: the split seen from above is split cos(beta).
+    Eq. 18, and with ``tilt`` beta (rad) the matrix of eq. 20: the split seen from above is split
+    cos(beta).
     """
-    alpha, ratio = np.broadcast_arrays(np.asarray(alpha, dtype=np.float64), offset / (split * np.cos(tilt)))
+    alpha, ratio = np.broadcast_arrays(
+        np.asarray(alpha, dtype=np.float64), offset / (split * np.cos(tilt))
+    )
     c, s = np.cos(alpha), np.sin(alpha)
-    return np.stack([np.stack([c / 2 - ratio * s, c / 2 + ratio * s], -1),
-                     np.stack([s / 2 + ratio * c, s / 2 - ratio * c], -1)], -2)
+    return np.stack(
+        [
+            np.stack([c / 2 - ratio * s, c / 2 + ratio * s], -1),
+            np.stack([s / 2 + ratio * c, s / 2 - ratio * c], -1),
+        ],
+        -2,
+    )
 
 
 def module_inverse(alpha: Any, split: Any, offset: Any, tilt: Any = 0.0) -> Array:
     """(..., 2, 2): inverse of ``module_jacobian`` in closed form (eqs. 19, 20); its determinant is
     -offset/(split cos(tilt)), so it always exists for tilts below 90 deg."""
-    alpha, half = np.broadcast_arrays(np.asarray(alpha, dtype=np.float64), split * np.cos(tilt) / (2 * offset))
+    alpha, half = np.broadcast_arrays(
+        np.asarray(alpha, dtype=np.float64), split * np.cos(tilt) / (2 * offset)
+    )
     c, s = np.cos(alpha), np.sin(alpha)
-    return np.stack([np.stack([c - half * s, s + half * c], -1),
-                     np.stack([c + half * s, s - half * c], -1)], -2)
+    return np.stack(
+        [np.stack([c - half * s, s + half * c], -1), np.stack([c + half * s, s - half * c], -1)], -2
+    )
 
 
 def link_velocities(positions: ArrayLike, twist: ArrayLike) -> Array:
-    """(..., N, 2): velocities of the module axes in the body frame, eq. 17 with [-sin, cos] where the thesis
-    prints [cos, sin]. ``positions`` (N, 2) m, ``twist`` (..., 3)."""
-    p, v = np.asarray(positions, dtype=np.float64), np.asarray(twist, dtype=np.float64)[..., None, :]
+    """(..., N, 2): velocities of the module axes in the body frame, eq. 17 with [-sin, cos] where
+    the thesis prints [cos, sin]. ``positions`` (N, 2) m, ``twist`` (..., 3)."""
+    p, v = (
+        np.asarray(positions, dtype=np.float64),
+        np.asarray(twist, dtype=np.float64)[..., None, :],
+    )
     return np.stack([v[..., 0] - v[..., 2] * p[:, 1], v[..., 1] + v[..., 2] * p[:, 0]], -1)
 
 
 def steering_rates(alpha: ArrayLike, links: ArrayLike, offset: float, yaw_rate: Any) -> Array:
-    """(N,): alpha' (rad/s) of the modules: the axle does not slide sideways, so the module turns in the
-    world at (sideways velocity)/offset. ``links`` (N, 2) as from ``link_velocities``."""
+    """(N,): alpha' (rad/s) of the modules: the axle does not slide sideways, so the module turns in
+    the world at (sideways velocity)/offset. ``links`` (N, 2) as from ``link_velocities``."""
     a, v = np.asarray(alpha, dtype=np.float64), np.asarray(links, dtype=np.float64)
     return np.asarray((-np.sin(a) * v[..., 0] + np.cos(a) * v[..., 1]) / offset - yaw_rate)
 
 
-def asoc_platform(geometry: AsocGeometry, alpha: ArrayLike | None = None, *, mass: float = TOTAL_MASS,
-                  cog_height: float = COG_HEIGHT) -> Platform:
-    """The robot as a platform: per module two castor wheels that share a pivot, wheel 1 then wheel 2.
+def asoc_platform(
+    geometry: AsocGeometry,
+    alpha: ArrayLike | None = None,
+    *,
+    mass: float = TOTAL_MASS,
+    cog_height: float = COG_HEIGHT,
+) -> Platform:
+    """The robot as a platform: per module two castor wheels that share a pivot, wheel 1 then wheel
+    2.
 
-    ``alpha`` (N,): module angles, rad, 0 unless given; mobility.inverse_at takes others (beta of a wheel is
-    alpha + pi/2 - zeta). ``mass`` kg; yaw inertia of a uniform disc (chosen).
+    ``alpha`` (N,): module angles, rad, 0 unless given; mobility.inverse_at takes others (beta of a
+    wheel is alpha + pi/2 - zeta). ``mass`` kg; yaw inertia of a uniform disc (chosen).
     """
     angles = np.zeros(geometry.modules) if alpha is None else np.asarray(alpha, dtype=np.float64)
     if angles.shape != (geometry.modules,) or not np.all(np.isfinite(angles)):
-        raise ArgumentError("alpha", angles.tolist(), f"{geometry.modules} finite angles, one a module, rad")
+        raise ArgumentError(
+            "alpha", angles.tolist(), f"{geometry.modules} finite angles, one a module, rad"
+        )
     wheels = tuple(
-        Wheel(WheelKind.CASTOR, geometry.module_radius, float(zeta), float(a + np.pi / 2 - zeta),
-              geometry.wheel_radius, offset=-geometry.offset, lateral=side * geometry.split / 2)
-        for zeta, a in zip(geometry.angles, angles, strict=True) for side in (-1.0, 1.0))
+        Wheel(
+            WheelKind.CASTOR,
+            geometry.module_radius,
+            float(zeta),
+            float(a + np.pi / 2 - zeta),
+            geometry.wheel_radius,
+            offset=-geometry.offset,
+            lateral=side * geometry.split / 2,
+        )
+        for zeta, a in zip(geometry.angles, angles, strict=True)
+        for side in (-1.0, 1.0)
+    )
     contacts = [(float(x), float(y)) for x, y in wheel_positions(geometry, angles).reshape(-1, 2)]
-    body = Body(mass, mass * geometry.module_radius**2 / 2, (0.0, 0.0, cog_height), tuple(contacts),
-                (float("nan"),) * len(contacts), (True,) * len(contacts))
+    body = Body(
+        mass,
+        mass * geometry.module_radius**2 / 2,
+        (0.0, 0.0, cog_height),
+        tuple(contacts),
+        (float("nan"),) * len(contacts),
+        (True,) * len(contacts),
+    )
     reach = geometry.module_radius + workspace_radius(geometry)
     corners = [2 * np.pi * k / 12 for k in range(12)]  # a 12-gon around the reach of the wheels
     outer = reach / np.cos(np.pi / 12)
@@ -132,7 +175,8 @@ def wheel_steering(geometry: AsocGeometry, alpha: ArrayLike) -> Array:
 
 
 def wheel_positions(geometry: AsocGeometry, alpha: ArrayLike) -> Array:
-    """(..., N, 2, 2): wheel centres seen from above, body frame, m; wheel 1 then 2. ``alpha`` (..., N), rad."""
+    """(..., N, 2, 2): wheel centres seen from above, body frame, m; wheel 1 then 2. ``alpha`` (...,
+    N), rad."""
     a = np.asarray(alpha, dtype=np.float64)
     ahead = np.stack([np.cos(a), np.sin(a)], -1)
     left = np.stack([-np.sin(a), np.cos(a)], -1)
@@ -141,20 +185,27 @@ def wheel_positions(geometry: AsocGeometry, alpha: ArrayLike) -> Array:
     return np.stack([axle - half * left, axle + half * left], -2)
 
 
-def wheel_frame(geometry: AsocGeometry, module: int, wheel: int, alpha: float, beta: float,
-                drop: float = 0.0) -> Array:
-    """(4, 4): frame 5_(n,m) of a wheel in the body frame 1, eqs. 12-16; ``module`` 0.., ``wheel`` 1 or 2.
+def wheel_frame(
+    geometry: AsocGeometry, module: int, wheel: int, alpha: float, beta: float, drop: float = 0.0
+) -> Array:
+    """(4, 4): frame 5_(n,m) of a wheel in the body frame 1, eqs. 12-16; ``module`` 0.., ``wheel`` 1
+    or 2.
 
-    ``drop`` (m): h, how far the axle hangs below the body frame. Corrected against the print: eq. 12
-    translates by (r cos, r sin, 0); alpha counts counter-clockwise; wheel 1 is on the right, as eq. 18 needs.
+    ``drop`` (m): h, how far the axle hangs below the body frame. Corrected against the print: eq.
+    12 translates by (r cos, r sin, 0); alpha counts counter-clockwise; wheel 1 is on the right, as
+    eq. 18 needs.
     """
     if wheel not in (1, 2) or not 0 <= module < geometry.modules:
-        raise ArgumentError("wheel", (module, wheel), f"module 0..{geometry.modules - 1} and wheel 1 or 2")
+        raise ArgumentError(
+            "wheel", (module, wheel), f"module 0..{geometry.modules - 1} and wheel 1 or 2"
+        )
     zeta = float(geometry.angles[module])
-    joints = ((0.0, zeta, geometry.module_radius, 0.0),  # Table VIII: d, angle, a, twist
-              (-drop, alpha - zeta - np.pi / 2, 0.0, np.pi / 2),
-              (geometry.offset, -beta, 0.0, 0.0),
-              (0.0, 0.0, geometry.split / 2 * (1 if wheel == 1 else -1), 0.0))
+    joints = (
+        (0.0, zeta, geometry.module_radius, 0.0),  # Table VIII: d, angle, a, twist
+        (-drop, alpha - zeta - np.pi / 2, 0.0, np.pi / 2),
+        (geometry.offset, -beta, 0.0, 0.0),
+        (0.0, 0.0, geometry.split / 2 * (1 if wheel == 1 else -1), 0.0),
+    )
     frame = np.eye(4)
     for distance, angle, length, twist in joints:
         frame = frame @ _joint(distance, angle, length, twist)
@@ -162,15 +213,24 @@ def wheel_frame(geometry: AsocGeometry, module: int, wheel: int, alpha: float, b
 
 
 def _joint(d: float, angle: float, a: float, twist: float) -> Array:
-    """Denavit-Hartenberg transformation: rotate about z, shift (a along the new x, d along z), twist about x."""
+    """Denavit-Hartenberg transformation: rotate about z, shift (a along the new x, d along z),
+    twist about x."""
     c, s, ct, st = np.cos(angle), np.sin(angle), np.cos(twist), np.sin(twist)
-    return np.array([[c, -s * ct, s * st, a * c], [s, c * ct, -c * st, a * s], [0.0, st, ct, d],
-                     [0.0, 0.0, 0.0, 1.0]])
+    return np.array(
+        [
+            [c, -s * ct, s * st, a * c],
+            [s, c * ct, -c * st, a * s],
+            [0.0, st, ct, d],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def workspace_radius(geometry: AsocGeometry) -> float:
     """Radius of the circle that a module's wheels sweep, m (eq. 5)."""
-    return float(envelope(geometry.offset, geometry.split, geometry.wheel_radius, geometry.wheel_width))
+    return float(
+        envelope(geometry.offset, geometry.split, geometry.wheel_radius, geometry.wheel_width)
+    )
 
 
 def envelope(offset: Any, split: Any, radius: Any, width: Any) -> Any:

@@ -1,13 +1,15 @@
 """Kinematic isotropy of robots on split offset casters (thesis 001, sections 2.1-2.5).
 
-Isotropy is the smallest over the largest *singular value* of a Jacobian, yaw weighed by an explicit length.
-"inverse" is the matrix from body twist to wheel speeds, W(alpha) = [F(alpha_i)^-1 [I, p_perp_i / length]];
-"forward" that from wheel speeds to body twist of eq. 2, the mean of the modules' F(alpha_i). Without tilt and
-with all wheels down they agree on average. Table I follows from "inverse" (wheels off the ground have no
-row), Table II from "forward". The average over independent, uniform module angles is taken after the ratio.
+Isotropy is the smallest over the largest *singular value* of a Jacobian, yaw weighed by an explicit
+length. "inverse" is the matrix from body twist to wheel speeds, W(alpha) = [F(alpha_i)^-1 [I,
+p_perp_i / length]]; "forward" that from wheel speeds to body twist of eq. 2, the mean of the
+modules' F(alpha_i). Without tilt and with all wheels down they agree on average. Table I follows
+from "inverse" (wheels off the ground have no row), Table II from "forward". The average over
+independent, uniform module angles is taken after the ratio.
 
-The average is a quasi-Monte-Carlo rule (rank-1 lattice, random shifts), good for the periodic integrand
-here; the spread of the shifts is the stated error. Singular values come from the 3 x 3 Gram matrix W^T W.
+The average is a quasi-Monte-Carlo rule (rank-1 lattice, random shifts), good for the periodic
+integrand here; the spread of the shifts is the stated error. Singular values come from the 3 x 3
+Gram matrix W^T W.
 """
 
 from __future__ import annotations
@@ -28,7 +30,9 @@ Jacobian = Literal["inverse", "forward"]
 POINTS = 4096  # of the lattice; error below 1e-3 on all of Table I, chosen
 SHIFTS = 8  # random shifts, for the error; chosen
 _SINGULAR = 1e-13  # eigenvalues below this share of the largest are rounding: no motion that way
-_KOROBOV = 76  # Korobov generator of the lattice: a good one for up to 8 angles, found by trial (chosen)
+_KOROBOV = (
+    76  # Korobov generator of the lattice: a good one for up to 8 angles, found by trial (chosen)
+)
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,8 @@ class MeanIsotropy:
 
 @dataclass(frozen=True)
 class Contact:
-    """Which wheels of N modules touch the ground: module numbers without contact and with one wheel only.
+    """Which wheels of N modules touch the ground: module numbers without contact and with one wheel
+    only.
 
     A module in ``partial`` keeps its wheel 2 (by symmetry of the average either gives the same).
     """
@@ -56,13 +61,21 @@ def spread_modules(count: int) -> Array:
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def isotropy(positions: ArrayLike, ratio: float | ArrayLike, alpha: ArrayLike, *,
-             contact: Contact | None = None, tilt: ArrayLike = 0.0, length: float = 1.0,
-             jacobian: Jacobian = "inverse") -> Array:
+def isotropy(
+    positions: ArrayLike,
+    ratio: float | ArrayLike,
+    alpha: ArrayLike,
+    *,
+    contact: Contact | None = None,
+    tilt: ArrayLike = 0.0,
+    length: float = 1.0,
+    jacobian: Jacobian = "inverse",
+) -> Array:
     """(n,): smallest over largest singular value at module angles ``alpha`` (n, N), rad.
 
-    ``positions`` (N, 2) of the module axes (m), ``ratio`` = split/offset, ``tilt`` (rad, broadcast to
-    (n, N)) of the axles, ``length`` (m) that weighs yaw. Raises ArgumentError for shapes that do not fit.
+    ``positions`` (N, 2) of the module axes (m), ``ratio`` = split/offset, ``tilt`` (rad, broadcast
+    to (n, N)) of the axles, ``length`` (m) that weighs yaw. Raises ArgumentError for shapes that do
+    not fit.
     """
     p, a, contact = _checked(positions, alpha, contact or Contact())
     if not (np.isfinite(length) and length > 0):
@@ -71,14 +84,17 @@ def isotropy(positions: ArrayLike, ratio: float | ArrayLike, alpha: ArrayLike, *
         raise ArgumentError("jacobian", jacobian, "inverse or forward")
     effective = np.broadcast_to(np.asarray(ratio) * np.cos(tilt), a.shape)
     if not np.all(effective > 0):
-        raise ArgumentError("ratio", np.asarray(ratio).tolist(), "split/offset > 0, tilts below 90 deg")
+        raise ArgumentError(
+            "ratio", np.asarray(ratio).tolist(), "split/offset > 0, tilts below 90 deg"
+        )
     gram = np.zeros((6, len(a)))
     for i in range(len(p)):
         if i in contact.lost:
             continue
         half = effective[:, i] / 2
         for side in (1.0,) if i in contact.partial else (-1.0, 1.0):
-            # a row of F^-1 [I, p_perp], the wheel side * split/2 beside the axis (asoc.module_inverse)
+            # a row of F^-1 [I, p_perp], the wheel side * split/2 beside the axis
+            # (asoc.module_inverse)
             across = side * half if jacobian == "inverse" else -side / half  # a row of F^T, twice
             x = np.cos(a[:, i]) + across * np.sin(a[:, i])
             y = np.sin(a[:, i]) - across * np.cos(a[:, i])
@@ -88,7 +104,8 @@ def isotropy(positions: ArrayLike, ratio: float | ArrayLike, alpha: ArrayLike, *
 
 
 def ratio_from_gram(gram: Array) -> Array:
-    """(n,): smallest over largest singular value of W from W^T W given as (6, n): xx, yy, zz, xy, xz, yz.
+    """(n,): smallest over largest singular value of W from W^T W given as (6, n): xx, yy, zz, xy,
+    xz, yz.
 
     Eigenvalues of symmetric 3 x 3 matrices by the trigonometric formula (Smith 1961).
     """
@@ -107,37 +124,67 @@ def ratio_from_gram(gram: Array) -> Array:
     return np.asarray(np.where(round_, 1.0, np.sqrt(share)))
 
 
-def mean_isotropy(positions: ArrayLike, ratio: float, *, rng: Generator, contact: Contact | None = None,
-                  tilts: Sequence[float] = (0.0,), length: float = 1.0, jacobian: Jacobian = "inverse",
-                  points: int = POINTS, shifts: int = SHIFTS) -> MeanIsotropy:
-    """Mean of ``isotropy`` over uniform module angles, and over ``tilts`` (rad) drawn by each module
-    independently with equal chance: every combination counts, as in the thesis's full factorial.
+def mean_isotropy(
+    positions: ArrayLike,
+    ratio: float,
+    *,
+    rng: Generator,
+    contact: Contact | None = None,
+    tilts: Sequence[float] = (0.0,),
+    length: float = 1.0,
+    jacobian: Jacobian = "inverse",
+    points: int = POINTS,
+    shifts: int = SHIFTS,
+) -> MeanIsotropy:
+    """Mean of ``isotropy`` over uniform module angles, and over ``tilts`` (rad) drawn by each
+    module independently with equal chance: every combination counts, as in the thesis's full
+    factorial.
 
     Raises ArgumentError for no tilt, fewer than 2 shifts or no points.
     """
     p = np.asarray(positions, dtype=np.float64)
     if len(tilts) == 0 or points < 1 or shifts < 2:
-        raise ArgumentError("points", (len(tilts), points, shifts), "tilts, >= 1 point and >= 2 shifts")
+        raise ArgumentError(
+            "points", (len(tilts), points, shifts), "tilts, >= 1 point and >= 2 shifts"
+        )
     levels, weights = _tilt_levels(tilts)
-    combinations = np.stack(np.meshgrid(*[np.arange(len(levels))] * len(p), indexing="ij"), -1).reshape(-1, len(p))
+    combinations = np.stack(
+        np.meshgrid(*[np.arange(len(levels))] * len(p), indexing="ij"), -1
+    ).reshape(-1, len(p))
     grid = np.outer(np.arange(points), float(_KOROBOV) ** np.arange(len(p)) % points) / points
     means = []
     for _ in range(shifts):
         alpha = 2 * np.pi * ((grid + rng.random(len(p))) % 1.0)
-        means.append(sum(
-            float(np.prod(weights[c])) * float(isotropy(p, ratio, alpha, contact=contact, tilt=levels[c],
-                                                        length=length, jacobian=jacobian).mean())
-            for c in combinations))
+        means.append(
+            sum(
+                float(np.prod(weights[c]))
+                * float(
+                    isotropy(
+                        p,
+                        ratio,
+                        alpha,
+                        contact=contact,
+                        tilt=levels[c],
+                        length=length,
+                        jacobian=jacobian,
+                    ).mean()
+                )
+                for c in combinations
+            )
+        )
     return MeanIsotropy(float(np.mean(means)), float(np.std(means, ddof=1) / np.sqrt(shifts)))
 
 
 def best_ratio(values: Array, ratios: Array) -> tuple[float, float]:
-    """Ratio and value at the top of a sampled curve, by a parabola through the three highest neighbours."""
+    """Ratio and value at the top of a sampled curve, by a parabola through the three highest
+    neighbours."""
     i = int(np.clip(np.argmax(values), 1, len(values) - 2))
     left, middle, right = values[i - 1 : i + 2]
     bend = left - 2 * middle + right
     shift = 0.0 if bend == 0 else float(np.clip((left - right) / (2 * bend), -1.0, 1.0))
-    return float(ratios[i] + shift * (ratios[i + 1] - ratios[i])), float(middle - (left - right) * shift / 4)
+    return float(ratios[i] + shift * (ratios[i + 1] - ratios[i])), float(
+        middle - (left - right) * shift / 4
+    )
 
 
 def _tilt_levels(tilts: Sequence[float]) -> tuple[Array, Array]:
@@ -146,7 +193,9 @@ def _tilt_levels(tilts: Sequence[float]) -> tuple[Array, Array]:
     return levels, counts / counts.sum()
 
 
-def _checked(positions: ArrayLike, alpha: ArrayLike, contact: Contact) -> tuple[Array, Array, Contact]:
+def _checked(
+    positions: ArrayLike, alpha: ArrayLike, contact: Contact
+) -> tuple[Array, Array, Contact]:
     p, a = np.asarray(positions, dtype=np.float64), np.asarray(alpha, dtype=np.float64)
     if p.ndim != 2 or p.shape[1] != 2 or not np.all(np.isfinite(p)):
         raise ArgumentError("positions", p.tolist(), "finite module positions, shape (N, 2), m")

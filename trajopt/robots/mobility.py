@@ -1,8 +1,10 @@
-"""What motions a platform allows: Pfaffian matrix, mobility table, kinematics at given steering angles.
+"""What motions a platform allows: Pfaffian matrix, mobility table, kinematics at given steering
+angles.
 
-Steering angles are one a wheel (W,), as the wheels' ``beta``; entries of wheels that cannot turn are not
-used. Every function takes them from the wheels where they are not given. Rows come from wheel.py only, so
-numbers and symbolic expressions (CasADi, for ``pfaffian_rows``) go through the same formulas.
+Steering angles are one a wheel (W,), as the wheels' ``beta``; entries of wheels that cannot turn
+are not used. Every function takes them from the wheels where they are not given. Rows come from
+wheel.py only, so numbers and symbolic expressions (CasADi, for ``pfaffian_rows``) go through the
+same formulas.
 """
 
 from __future__ import annotations
@@ -26,7 +28,8 @@ _TURNS = (WheelKind.STEERED, WheelKind.CASTOR)
 
 @dataclass(frozen=True)
 class Mobility:
-    """Degrees of mobility, steerability and manoeuvrability (003; Campion, Bastin, d'Andrea-Novel)."""
+    """Degrees of mobility, steerability and manoeuvrability (003; Campion, Bastin,
+    d'Andrea-Novel)."""
 
     mobility: int
     steerability: int
@@ -39,8 +42,9 @@ class Mobility:
 def pfaffian_rows(platform: Platform, steering: Sequence[Any] | None = None) -> list[list[Any]]:
     """Rows of the Pfaffian matrix A as nested lists, so that steering angles may be symbols.
 
-    A @ (vx, vy, wz, phi'_1 .. phi'_W, beta'_1 .. beta'_W) = 0: a rolling and a sliding row a wheel, the
-    twist in the body frame. Rows that constrain nothing (Swedish sliding, spherical) are left out.
+    A @ (vx, vy, wz, phi'_1 .. phi'_W, beta'_1 .. beta'_W) = 0: a rolling and a sliding row a wheel,
+    the twist in the body frame. Rows that constrain nothing (Swedish sliding, spherical) are left
+    out.
     """
     angles = _angles(platform, steering)
     count = len(platform.wheels)
@@ -54,13 +58,17 @@ def pfaffian_rows(platform: Platform, steering: Sequence[Any] | None = None) -> 
     return matrix
 
 
-def pfaffian(platform: Platform, steering: ArrayLike | None = None, *, yaw: float | None = None) -> Array:
+def pfaffian(
+    platform: Platform, steering: ArrayLike | None = None, *, yaw: float | None = None
+) -> Array:
     """(R, 3 + 2 W): the Pfaffian matrix A of ``pfaffian_rows`` as numbers.
 
-    With ``yaw`` (rad) the twist is (x', y', yaw') in the world frame, as in lecture 003; R^T(yaw) stands
-    where the lecture's eqs. 5-10 print R.
+    With ``yaw`` (rad) the twist is (x', y', yaw') in the world frame, as in lecture 003; R^T(yaw)
+    stands where the lecture's eqs. 5-10 print R.
     """
-    matrix = np.array(pfaffian_rows(platform, _checked(platform, steering).tolist()), dtype=np.float64)
+    matrix = np.array(
+        pfaffian_rows(platform, _checked(platform, steering).tolist()), dtype=np.float64
+    )
     if yaw is not None:
         c, s = np.cos(yaw), np.sin(yaw)
         to_body = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -70,22 +78,29 @@ def pfaffian(platform: Platform, steering: ArrayLike | None = None, *, yaw: floa
 
 def inverse_at(platform: Platform, steering: ArrayLike | None = None) -> Array:
     """(W, 3): wheel rates (rad/s) = inverse @ (vx, vy, wz) at steering angles (W,), rad."""
-    rows = [w.driving(b) for w, b in zip(platform.wheels, _checked(platform, steering), strict=True)]
+    rows = [
+        w.driving(b) for w, b in zip(platform.wheels, _checked(platform, steering), strict=True)
+    ]
     return np.array([[r.x / r.spin, r.y / r.spin, r.yaw / r.spin] for r in rows], dtype=np.float64)
 
 
 def forward_at(platform: Platform, steering: ArrayLike | None = None) -> Array:
-    """(3, W): body twist = forward @ wheel rates at steering angles (W,), rad; least squares where wheels
-    disagree, sliding rows exactly kept. Zero where no motion is possible."""
+    """(3, W): body twist = forward @ wheel rates at steering angles (W,), rad; least squares where
+    wheels disagree, sliding rows exactly kept. Zero where no motion is possible."""
     allowed = admissible_at(platform, steering)
-    return np.asarray(allowed @ np.linalg.pinv(inverse_at(platform, steering) @ allowed), dtype=np.float64)
+    return np.asarray(
+        allowed @ np.linalg.pinv(inverse_at(platform, steering) @ allowed), dtype=np.float64
+    )
 
 
 def steering_rates(platform: Platform, steering: ArrayLike, twist: ArrayLike) -> Array:
-    """(W,): steering rates beta' (rad/s) that castors must have at a body twist; 0 for other wheels."""
+    """(W,): steering rates beta' (rad/s) that castors must have at a body twist; 0 for other
+    wheels."""
     velocity = np.asarray(twist, dtype=np.float64)
     rates = np.zeros(len(platform.wheels))
-    for i, (wheel, beta) in enumerate(zip(platform.wheels, _checked(platform, steering), strict=True)):
+    for i, (wheel, beta) in enumerate(
+        zip(platform.wheels, _checked(platform, steering), strict=True)
+    ):
         if wheel.kind is WheelKind.CASTOR:
             row = wheel.sliding(beta)
             rates[i] = float(np.dot((row.x, row.y, row.yaw), velocity)) / row.steer
@@ -93,31 +108,39 @@ def steering_rates(platform: Platform, steering: ArrayLike, twist: ArrayLike) ->
 
 
 def admissible_at(platform: Platform, steering: ArrayLike | None = None) -> Array:
-    """(3, m): orthonormal basis of the body twists that no sliding row forbids at steering angles (W,), rad."""
+    """(3, m): orthonormal basis of the body twists that no sliding row forbids at steering angles
+    (W,), rad."""
     angles = _checked(platform, steering)
-    return _null(_sliding(zip(platform.wheels, angles, strict=True), (WheelKind.FIXED, WheelKind.STEERED)))
+    return _null(
+        _sliding(zip(platform.wheels, angles, strict=True), (WheelKind.FIXED, WheelKind.STEERED))
+    )
 
 
 def mobility_of(platform: Platform) -> Mobility:
     """Degrees of mobility and steerability of a platform, steered wheels turned to a common centre.
 
-    Mobility is 3 - rank of the sliding rows of fixed and steered wheels, steerability the rank that steered
-    wheels add to the fixed ones' (003: the rank of the steered rows, where they are independent of these).
+    Mobility is 3 - rank of the sliding rows of fixed and steered wheels, steerability the rank that
+    steered wheels add to the fixed ones' (003: the rank of the steered rows, where they are
+    independent of these).
     """
     fixed = _sliding([(w, w.beta) for w in platform.wheels], (WheelKind.FIXED,))
     basis = _null(fixed)
     if basis.shape[1] == 0:
         return Mobility(0, 0)
-    generic = basis @ np.array([1.0, 0.618, 0.414])[: basis.shape[1]]  # a twist without special symmetry
+    generic = (
+        basis @ np.array([1.0, 0.618, 0.414])[: basis.shape[1]]
+    )  # a twist without special symmetry
     angles = steering_for(platform, generic)
-    every = _sliding(zip(platform.wheels, angles, strict=True), (WheelKind.FIXED, WheelKind.STEERED))
+    every = _sliding(
+        zip(platform.wheels, angles, strict=True), (WheelKind.FIXED, WheelKind.STEERED)
+    )
     return Mobility(3 - _rank(every), _rank(every) - _rank(fixed))
 
 
 def steering_for(platform: Platform, twist: ArrayLike) -> Array:
-    """(W,): steering angles (rad) at which every steered wheel follows a body twist (vx, vy, wz) without
-    sliding. Fixed wheels, Swedish wheels and castors keep their ``beta``. A wheel at the centre of rotation
-    keeps its angle too, since any serves."""
+    """(W,): steering angles (rad) at which every steered wheel follows a body twist (vx, vy, wz)
+    without sliding. Fixed wheels, Swedish wheels and castors keep their ``beta``. A wheel at the
+    centre of rotation keeps its angle too, since any serves."""
     vx, vy, wz = np.asarray(twist, dtype=np.float64)
     angles = [w.beta for w in platform.wheels]
     for i, wheel in enumerate(platform.wheels):
@@ -130,9 +153,9 @@ def steering_for(platform: Platform, twist: ArrayLike) -> Array:
 
 
 def rotation_centre(twist: ArrayLike) -> Array:
-    """(3,): instantaneous centre of rotation of a body twist in homogeneous coordinates (x w, y w, w), body
-    frame, scaled to unit length; w = 0 where the body translates (the centre lies at infinity, across the
-    motion). Raises ArgumentError for a body at rest."""
+    """(3,): instantaneous centre of rotation of a body twist in homogeneous coordinates (x w, y w,
+    w), body frame, scaled to unit length; w = 0 where the body translates (the centre lies at
+    infinity, across the motion). Raises ArgumentError for a body at rest."""
     vx, vy, wz = np.asarray(twist, dtype=np.float64)
     centre = np.array([-vy, vx, wz])
     size = float(np.linalg.norm(centre))
@@ -157,7 +180,7 @@ def _null(rows: Array) -> Array:
     if len(rows) == 0:
         return np.eye(3)
     _, singular, vt = np.linalg.svd(rows)
-    return np.asarray(vt[int(np.sum(singular > _RANK * singular.max())):].T, dtype=np.float64)
+    return np.asarray(vt[int(np.sum(singular > _RANK * singular.max())) :].T, dtype=np.float64)
 
 
 def _rank(rows: Array) -> int:
@@ -168,8 +191,12 @@ def _angles(platform: Platform, steering: Sequence[Any] | None) -> list[Any]:
     if steering is None:
         return [w.beta for w in platform.wheels]
     if len(steering) != len(platform.wheels):
-        raise ArgumentError("steering", len(steering), f"one angle a wheel ({len(platform.wheels)})")
-    return [b if w.kind in _TURNS else w.beta for w, b in zip(platform.wheels, steering, strict=True)]
+        raise ArgumentError(
+            "steering", len(steering), f"one angle a wheel ({len(platform.wheels)})"
+        )
+    return [
+        b if w.kind in _TURNS else w.beta for w, b in zip(platform.wheels, steering, strict=True)
+    ]
 
 
 def _checked(platform: Platform, steering: ArrayLike | None) -> Array:
@@ -177,5 +204,7 @@ def _checked(platform: Platform, steering: ArrayLike | None) -> Array:
         return np.array([w.beta for w in platform.wheels], dtype=np.float64)
     array = np.asarray(steering, dtype=np.float64)
     if array.shape != (len(platform.wheels),) or not np.all(np.isfinite(array)):
-        raise ArgumentError("steering", array.tolist(), f"{len(platform.wheels)} finite angles, one a wheel, rad")
+        raise ArgumentError(
+            "steering", array.tolist(), f"{len(platform.wheels)} finite angles, one a wheel, rad"
+        )
     return np.array(_angles(platform, array.tolist()), dtype=np.float64)

@@ -1,7 +1,9 @@
-"""Platforms of the textbook (lecture 003), with sizes that callers give or leave at chosen defaults.
+"""Platforms of the textbook (lecture 003), with sizes that callers give or leave at chosen
+defaults.
 
-Default lengths, masses and heights are chosen: round numbers of a small indoor robot. Platforms list every
-wheel that keeps a rolling row, driven or not; free castors that only carry load are left out.
+Default lengths, masses and heights are chosen: round numbers of a small indoor robot. Platforms
+list every wheel that keeps a rolling row, driven or not; free castors that only carry load are left
+out.
 """
 
 from __future__ import annotations
@@ -34,26 +36,38 @@ def differential(half_track: float = HALF_WIDTH, radius: float = RADIUS) -> Plat
     """Differential drive: two fixed wheels on the y axis, and a front castor that carries load."""
     contacts = ((0.0, half_track), (0.0, -half_track), (HALF_LENGTH, 0.0))
     body = _body(contacts, driven=(True, True, False))
-    return differential_platform("differential", half_track=half_track, radius=radius, body=body,
-                                 footprint=_box(contacts))
+    return differential_platform(
+        "differential", half_track=half_track, radius=radius, body=body, footprint=_box(contacts)
+    )
 
 
 def bicycle(wheelbase: float = 2 * HALF_LENGTH, radius: float = RADIUS) -> Platform:
     """Fixed rear wheel at the origin, steered front wheel ahead of it."""
-    return _platform("bicycle", (fixed_wheel(0.0, 0.0, radius), steered_wheel(wheelbase, 0.0, radius)))
+    return _platform(
+        "bicycle", (fixed_wheel(0.0, 0.0, radius), steered_wheel(wheelbase, 0.0, radius))
+    )
 
 
-def tricycle(wheelbase: float = 2 * HALF_LENGTH, half_track: float = HALF_WIDTH,
-             radius: float = RADIUS) -> Platform:
+def tricycle(
+    wheelbase: float = 2 * HALF_LENGTH, half_track: float = HALF_WIDTH, radius: float = RADIUS
+) -> Platform:
     """Two fixed rear wheels on the y axis, one steered front wheel."""
-    return _platform("tricycle", (fixed_wheel(0.0, half_track, radius), fixed_wheel(0.0, -half_track, radius),
-                                  steered_wheel(wheelbase, 0.0, radius)))
+    return _platform(
+        "tricycle",
+        (
+            fixed_wheel(0.0, half_track, radius),
+            fixed_wheel(0.0, -half_track, radius),
+            steered_wheel(wheelbase, 0.0, radius),
+        ),
+    )
 
 
 def two_steer(wheelbase: float = 2 * HALF_LENGTH, radius: float = RADIUS) -> Platform:
     """Two steered wheels, front and rear."""
-    return _platform("two-steer", (steered_wheel(wheelbase / 2, 0.0, radius),
-                                   steered_wheel(-wheelbase / 2, 0.0, radius)))
+    return _platform(
+        "two-steer",
+        (steered_wheel(wheelbase / 2, 0.0, radius), steered_wheel(-wheelbase / 2, 0.0, radius)),
+    )
 
 
 def three_omni(distance: float = HALF_LENGTH, radius: float = RADIUS) -> Platform:
@@ -62,12 +76,20 @@ def three_omni(distance: float = HALF_LENGTH, radius: float = RADIUS) -> Platfor
     return _platform("three-omni", wheels)
 
 
-def four_mecanum(half_wheelbase: float = HALF_LENGTH, half_track: float = HALF_WIDTH,
-                 radius: float = RADIUS) -> Platform:
+def four_mecanum(
+    half_wheelbase: float = HALF_LENGTH, half_track: float = HALF_WIDTH, radius: float = RADIUS
+) -> Platform:
     """Four Mecanum wheels with 45 degree rollers."""
-    return mecanum_platform("four-mecanum", half_wheelbase=half_wheelbase, half_track=half_track,
-                            radius=radius, mass=MASS, yaw_inertia=_yaw_inertia(), cog_height=COG_HEIGHT,
-                            overhang=OVERHANG)
+    return mecanum_platform(
+        "four-mecanum",
+        half_wheelbase=half_wheelbase,
+        half_track=half_track,
+        radius=radius,
+        mass=MASS,
+        yaw_inertia=_yaw_inertia(),
+        cog_height=COG_HEIGHT,
+        overhang=OVERHANG,
+    )
 
 
 def asoc(modules: int = 4) -> Platform:
@@ -75,19 +97,22 @@ def asoc(modules: int = 4) -> Platform:
     return asoc_platform(AsocGeometry(modules=modules))
 
 
-NAMED: Mapping[str, Callable[[], Platform]] = MappingProxyType({
-    "differential": differential,
-    "bicycle": bicycle,
-    "tricycle": tricycle,
-    "two-steer": two_steer,
-    "three-omni": three_omni,
-    "four-mecanum": four_mecanum,
-    "asoc": asoc,
-})
+NAMED: Mapping[str, Callable[[], Platform]] = MappingProxyType(
+    {
+        "differential": differential,
+        "bicycle": bicycle,
+        "tricycle": tricycle,
+        "two-steer": two_steer,
+        "three-omni": three_omni,
+        "four-mecanum": four_mecanum,
+        "asoc": asoc,
+    }
+)
 
 
 def platform_named(name: str) -> Platform:
-    """The textbook platform called ``name`` with default sizes. Raises ArgumentError for an unknown one."""
+    """The textbook platform called ``name`` with default sizes. Raises ArgumentError for an unknown
+    one."""
     if name not in NAMED:
         raise ArgumentError("platform", name, "one of " + ", ".join(NAMED))
     return NAMED[name]()
@@ -103,8 +128,14 @@ def _yaw_inertia() -> float:
 
 def _body(contacts: Sequence[tuple[float, float]], driven: Sequence[bool]) -> Body:
     middle = np.mean(np.array(contacts), axis=0)
-    return Body(MASS, _yaw_inertia(), (float(middle[0]), float(middle[1]), COG_HEIGHT), tuple(contacts),
-                (float("nan"),) * len(contacts), tuple(driven))
+    return Body(
+        MASS,
+        _yaw_inertia(),
+        (float(middle[0]), float(middle[1]), COG_HEIGHT),
+        tuple(contacts),
+        (float("nan"),) * len(contacts),
+        tuple(driven),
+    )
 
 
 def _box(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
@@ -115,5 +146,9 @@ def _box(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], ..
 
 def _platform(name: str, wheels: tuple[Wheel, ...]) -> Platform:
     contacts = [w.position for w in wheels]
-    holonomic = all(w.kind in (WheelKind.SWEDISH, WheelKind.CASTOR, WheelKind.SPHERICAL) for w in wheels)
-    return Platform(name, wheels, _body(contacts, [True] * len(wheels)), _box(contacts), holonomic=holonomic)
+    holonomic = all(
+        w.kind in (WheelKind.SWEDISH, WheelKind.CASTOR, WheelKind.SPHERICAL) for w in wheels
+    )
+    return Platform(
+        name, wheels, _body(contacts, [True] * len(wheels)), _box(contacts), holonomic=holonomic
+    )

@@ -1,10 +1,10 @@
 """PowerBot, the robot of thesis 004: two driven wheels in front, free casters behind.
 
-The body origin is the middle of the drive axle on the ground, x forward. Mass, centre of gravity and axle
-distances are the thesis's (sections 2.3.2, appendices 2 and 3). Outline and largest speeds are those of the
-maker's own parameter set for this robot (ARIA, class ArRobotPowerBot); the half-track follows from its
-DiffConvFactor. Wheel radius, the track of the casters and the yaw inertia are not printed: chosen, so vary
-them.
+The body origin is the middle of the drive axle on the ground, x forward. Mass, centre of gravity
+and axle distances are the thesis's (sections 2.3.2, appendices 2 and 3). Outline and largest speeds
+are those of the maker's own parameter set for this robot (ARIA, class ArRobotPowerBot); the
+half-track follows from its DiffConvFactor. Wheel radius, the track of the casters and the yaw
+inertia are not printed: chosen, so vary them.
 """
 
 from __future__ import annotations
@@ -38,21 +38,34 @@ CASTER_HALF_TRACK = 0.22  # m, chosen: inside the outline
 CASTER_RADIUS = 0.07  # m, height of the caster's axle in appendix 3
 
 
-def powerbot(cog_height: float = COG_HEIGHT, half_track: float = HALF_TRACK,
-             caster_half_track: float = CASTER_HALF_TRACK) -> Platform:
+def powerbot(
+    cog_height: float = COG_HEIGHT,
+    half_track: float = HALF_TRACK,
+    caster_half_track: float = CASTER_HALF_TRACK,
+) -> Platform:
     """PowerBot with its default sizes (see module docstring for sources); lengths in m.
 
-    Contacts in the order drive left, drive right, caster left, caster right. Only the drive wheels pass
-    traction; casters carry load. Wheel order of every per-wheel array: left, right.
+    Contacts in the order drive left, drive right, caster left, caster right. Only the drive wheels
+    pass traction; casters carry load. Wheel order of every per-wheel array: left, right.
     """
     casters = -(COG_TO_DRIVE_AXLE + COG_TO_CASTER_AXLE)
     yaw_inertia = MASS * ((FRONT + REAR) ** 2 + WIDTH**2) / 12  # kg m^2, uniform plate, chosen
     free = float("nan")  # plain tyres: no roller axis
-    body = Body(MASS, yaw_inertia, (-COG_TO_DRIVE_AXLE, 0.0, cog_height),
-                ((0.0, half_track), (0.0, -half_track),
-                 (casters, caster_half_track), (casters, -caster_half_track)),
-                (free,) * 4, (True, True, False, False))
+    body = Body(
+        MASS,
+        yaw_inertia,
+        (-COG_TO_DRIVE_AXLE, 0.0, cog_height),
+        (
+            (0.0, half_track),
+            (0.0, -half_track),
+            (casters, caster_half_track),
+            (casters, -caster_half_track),
+        ),
+        (free,) * 4,
+        (True, True, False, False),
+    )
     side = WIDTH / 2
     outline = ((FRONT, side), (-REAR, side), (-REAR, -side), (FRONT, -side))
-    return differential_platform("powerbot", half_track=half_track, radius=WHEEL_RADIUS, body=body,
-                                 footprint=outline)
+    return differential_platform(
+        "powerbot", half_track=half_track, radius=WHEEL_RADIUS, body=body, footprint=outline
+    )

@@ -1,17 +1,20 @@
-"""Outline of the semi-circular Mecanum double wheel (SMDW) at a step, in closed form and as a point cloud.
+"""Outline of the semi-circular Mecanum double wheel (SMDW) at a step, in closed form and as a point
+cloud.
 
-SMDW thesis, section 4.1: each hub's outline is a half circle (Rc) joined to a half ellipse (Rc, Re); the two
-hubs sit side by side on one axle, half a turn apart, so that one half circle always carries.
+SMDW thesis, section 4.1: each hub's outline is a half circle (Rc) joined to a half ellipse (Rc,
+Re); the two hubs sit side by side on one axle, half a turn apart, so that one half circle always
+carries.
 
-Wheel frame: x forward, y along the axle towards the step, z up, origin at the axle, whose height over the
-ground is Rc. The *facing* hub is the one on the side of the step. ``theta`` is the wheel angle counted from
-where the facing hub has its ellipse down, positive forward (about +y). ``yaw`` in [-pi, 0] is the direction of
-the wheel's x axis seen from the step's normal: -pi/2 puts the wheel's face parallel to the step (lateral
-motion), 0 is square on. Wheels that meet the step with their right side are mirror images.
+Wheel frame: x forward, y along the axle towards the step, z up, origin at the axle, whose height
+over the ground is Rc. The *facing* hub is the one on the side of the step. ``theta`` is the wheel
+angle counted from where the facing hub has its ellipse down, positive forward (about +y). ``yaw``
+in [-pi, 0] is the direction of the wheel's x axis seen from the step's normal: -pi/2 puts the
+wheel's face parallel to the step (lateral motion), 0 is square on. Wheels that meet the step with
+their right side are mirror images.
 
-The step may come as near as the *collision line*: where the hub that carries the load would touch the step's
-face. What the lifted hub then has above the step decides. The outline is convex, so everything follows from
-its support function and its intersection with straight lines.
+The step may come as near as the *collision line*: where the hub that carries the load would touch
+the step's face. What the lifted hub then has above the step decides. The outline is convex, so
+everything follows from its support function and its intersection with straight lines.
 """
 
 from __future__ import annotations
@@ -27,8 +30,9 @@ from trajopt.robots.loc8 import WHEEL_RADIUS
 
 Array = NDArray[np.float64]
 
-# Rc is the rolling radius. Re: 5 cm steps need Rc - Re > 5 cm, which the 4.8 cm of 0.098/0.05 m does not give and
-# the sizes fitted to the printed contact offsets (4.75 cm) do not either, although the thesis climbs 5 cm.
+# Rc is the rolling radius. Re: 5 cm steps need Rc - Re > 5 cm, which the 4.8 cm of 0.098/0.05 m
+# does not give and the sizes fitted to the printed contact offsets (4.75 cm) do not either,
+# although the thesis climbs 5 cm.
 MINOR_RADIUS = 0.047  # m, chosen: Rc - Re = 5.1 cm
 HUB_DEPTH = 0.045  # m along the axle, chosen: the width of its rollers
 HUB_GAP = 0.03  # m between the hubs, chosen: room for the arm that carries the wheel
@@ -37,7 +41,8 @@ CLOUD_POINTS = 36_000  # points a contour; spacing 1.8e-5 m on a 0.1 m wheel
 
 @dataclass(frozen=True)
 class DoubleWheel:
-    """Sizes of the two hubs, m: Rc ``radius``, Re ``minor_radius``, hub ``depth`` along the axle, ``gap`` between.
+    """Sizes of the two hubs, m: Rc ``radius``, Re ``minor_radius``, hub ``depth`` along the axle,
+    ``gap`` between.
 
     Raises ArgumentError for sizes that make no double wheel.
     """
@@ -51,9 +56,13 @@ class DoubleWheel:
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise ArgumentError("radius", self.radius, "a length > 0 m")
         if not 0 < self.minor_radius <= self.radius:
-            raise ArgumentError("minor_radius", self.minor_radius, f"a length in (0, {self.radius:g}] m")
+            raise ArgumentError(
+                "minor_radius", self.minor_radius, f"a length in (0, {self.radius:g}] m"
+            )
         if not (0 < self.depth < math.inf and 0 <= self.gap < math.inf):
-            raise ArgumentError("depth, gap", (self.depth, self.gap), "a depth > 0 m and a gap >= 0 m")
+            raise ArgumentError(
+                "depth, gap", (self.depth, self.gap), "a depth > 0 m and a gap >= 0 m"
+            )
 
     @property
     def greatest_clearance(self) -> float:
@@ -68,13 +77,14 @@ class DoubleWheel:
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """Wheel at its collision line in front of a step; arrays of the broadcast shape of (theta, yaw).
+    """Wheel at its collision line in front of a step; arrays of the broadcast shape of (theta,
+    yaw).
 
-    ``over``: whether the lifted hub has any part above the step (without one ``clearance`` is inf, the rest 0).
-    ``clearance`` (m): its lowest point there, above the ground. ``offset`` (m): x of that point, ahead of the
-    axle. ``arm`` (m): its distance from the axle. ``tangent`` (rad, <= 0): angle of the outline there,
-    negative where it rises towards the step (zeta_m of Eqn. 4.13). ``line`` (m): distance of the collision line from
-    the axle along the step's normal.
+    ``over``: whether the lifted hub has any part above the step (without one ``clearance`` is inf,
+    the rest 0). ``clearance`` (m): its lowest point there, above the ground. ``offset`` (m): x of
+    that point, ahead of the axle. ``arm`` (m): its distance from the axle. ``tangent`` (rad, <= 0):
+    angle of the outline there, negative where it rises towards the step (zeta_m of Eqn. 4.13).
+    ``line`` (m): distance of the collision line from the axle along the step's normal.
     """
 
     over: NDArray[np.bool_]
@@ -86,27 +96,33 @@ class Meeting:
 
 
 def support_down(wheel: DoubleWheel, angle: ArrayLike) -> Array:
-    """Distance (m) from the axle down to the lowest point of a hub turned by ``angle`` from ellipse-down."""
+    """Distance (m) from the axle down to the lowest point of a hub turned by ``angle`` from
+    ellipse-down."""
     a = np.asarray(angle, dtype=np.float64)
     ellipse = np.hypot(wheel.radius * np.sin(a), wheel.minor_radius * np.cos(a))
     return np.where(np.cos(a) >= 0, ellipse, wheel.radius)
 
 
 def contact_offset(wheel: DoubleWheel, angle: ArrayLike) -> Array:
-    """x (m) of a hub's lowest point ahead of the axle: the flat-faced cam's contact (Figure 4.10)."""
+    """x (m) of a hub's lowest point ahead of the axle: the flat-faced cam's contact (Figure
+    4.10)."""
     a = np.asarray(angle, dtype=np.float64)
     excess = (wheel.radius**2 - wheel.minor_radius**2) * np.sin(a) * np.cos(a)
     return np.where(np.cos(a) >= 0, excess / support_down(wheel, a), 0.0)
 
 
 def meet_step(wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: float) -> Meeting:
-    """Closed form of the wheel at its collision line before a step of ``height`` (m); broadcasts theta and yaw.
+    """Closed form of the wheel at its collision line before a step of ``height`` (m); broadcasts
+    theta and yaw.
 
     Raises ArgumentError for a height outside (0, Rc) or a yaw outside [-pi, 0].
     """
     theta, yaw, nx, ny, facing_lifted, carrying, lifted = _roles(wheel, theta, yaw, height)
     near, far = _faces(wheel, facing_lifted)
-    line = nx * _reach(wheel, carrying, height - wheel.radius, np.where(nx >= 0, 1.0, -1.0)) + ny * near
+    line = (
+        nx * _reach(wheel, carrying, height - wheel.radius, np.where(nx >= 0, 1.0, -1.0))
+        + ny * near
+    )
     low_x, low_z = contact_offset(wheel, lifted), -support_down(wheel, lifted)
     free = nx * low_x + ny * far >= line
     steep = np.where(np.abs(nx) > 1e-12, nx, 1.0)
@@ -115,13 +131,21 @@ def meet_step(wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: floa
     over = free | (inside & (np.abs(nx) > 1e-12))
     x, z = np.where(free, low_x, cut), np.where(free, low_z, cut_z)
     rise = np.where(free, 0.0, np.sign(nx) * slope)
-    return Meeting(over, np.where(over, wheel.radius + z, np.inf), np.where(over, x, 0.0),
-                   np.where(over, np.hypot(x, z), 0.0), np.where(over, -np.arctan(np.maximum(rise, 0.0)), 0.0), line)
+    return Meeting(
+        over,
+        np.where(over, wheel.radius + z, np.inf),
+        np.where(over, x, 0.0),
+        np.where(over, np.hypot(x, z), 0.0),
+        np.where(over, -np.arctan(np.maximum(rise, 0.0)), 0.0),
+        line,
+    )
 
 
-def meet_step_cloud(wheel: DoubleWheel, theta: float, yaw: float, height: float,
-                    points: int = CLOUD_POINTS) -> Meeting:
-    """The same from the point cloud Gamma(theta, alpha) (Eqns. 4.1-4.7), one wheel angle and yaw at a time."""
+def meet_step_cloud(
+    wheel: DoubleWheel, theta: float, yaw: float, height: float, points: int = CLOUD_POINTS
+) -> Meeting:
+    """The same from the point cloud Gamma(theta, alpha) (Eqns. 4.1-4.7), one wheel angle and yaw at
+    a time."""
     _, _, nx, ny, facing_lifted, carrying, lifted = _roles(wheel, theta, yaw, height)
     near, far = (float(v) for v in _faces(wheel, facing_lifted))
     a, b = float(nx), float(ny)
@@ -129,9 +153,16 @@ def meet_step_cloud(wheel: DoubleWheel, theta: float, yaw: float, height: float,
     x, z = _turned(outline(wheel, points), float(carrying))
     k = int(np.argmax(np.where(z <= level, a * x, -np.inf)))
     foremost = float(x[k])
-    for j in ((k - 1) % points, (k + 1) % points):  # farther where the contour crosses the step's height
+    for j in (
+        (k - 1) % points,
+        (k + 1) % points,
+    ):  # farther where the contour crosses the step's height
         if z[j] > level:
-            foremost = max(foremost, float(x[k] + (x[j] - x[k]) * (level - z[k]) / (z[j] - z[k])), key=lambda v: a * v)
+            foremost = max(
+                foremost,
+                float(x[k] + (x[j] - x[k]) * (level - z[k]) / (z[j] - z[k])),
+                key=lambda v: a * v,
+            )
     line = a * foremost + b * near
     x, z = _turned(outline(wheel, points), float(lifted))
     beyond = np.flatnonzero(a * x + b * far >= line)
@@ -140,32 +171,61 @@ def meet_step_cloud(wheel: DoubleWheel, theta: float, yaw: float, height: float,
         return Meeting(np.array(False), np.array(np.inf), zero, zero, zero, np.array(line))
     i = int(beyond[np.argmin(z[beyond])])
     at_x, at_z, rise = float(x[i]), float(z[i]), 0.0
-    if i != int(np.argmin(z)):  # cut off by the line: interpolate to it, along the edge that crosses it
-        j = next((k for k in ((i - 1) % points, (i + 1) % points) if a * x[k] + b * far < line), (i + 1) % points)
+    if i != int(
+        np.argmin(z)
+    ):  # cut off by the line: interpolate to it, along the edge that crosses it
+        j = next(
+            (k for k in ((i - 1) % points, (i + 1) % points) if a * x[k] + b * far < line),
+            (i + 1) % points,
+        )
         rise = math.atan((z[j] - z[i]) / (x[j] - x[i])) * math.copysign(1.0, a)
         at_x = (line - b * far) / a
         at_z = float(z[i] + (z[j] - z[i]) * (at_x - x[i]) / (x[j] - x[i]))
-    return Meeting(np.array(True), np.array(wheel.radius + at_z), np.array(at_x), np.array(math.hypot(at_x, at_z)),
-                   np.array(-max(rise, 0.0)), np.array(line))
+    return Meeting(
+        np.array(True),
+        np.array(wheel.radius + at_z),
+        np.array(at_x),
+        np.array(math.hypot(at_x, at_z)),
+        np.array(-max(rise, 0.0)),
+        np.array(line),
+    )
 
 
 def outline(wheel: DoubleWheel, points: int = CLOUD_POINTS) -> Array:
     """(2, points): x and z (m) of one hub's contour, ellipse down (Eqns. 4.1, 4.2)."""
     t = np.arange(points) * (2 * np.pi / points)
-    return np.stack([wheel.radius * np.cos(t), np.where(t < np.pi, wheel.radius, wheel.minor_radius) * np.sin(t)])
+    return np.stack(
+        [
+            wheel.radius * np.cos(t),
+            np.where(t < np.pi, wheel.radius, wheel.minor_radius) * np.sin(t),
+        ]
+    )
 
 
-def _roles(wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: float) -> tuple[
-        Array, Array, Array, Array, NDArray[np.bool_], Array, Array]:
-    """Broadcast angles, the step's normal in the wheel frame, and which hub carries, with both hubs' angles."""
+def _roles(
+    wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: float
+) -> tuple[Array, Array, Array, Array, NDArray[np.bool_], Array, Array]:
+    """Broadcast angles, the step's normal in the wheel frame, and which hub carries, with both
+    hubs' angles."""
     if not 0 < height < wheel.radius:
-        raise ArgumentError("height", height, f"a step between 0 and the wheel radius {wheel.radius:g} m")
-    t, y = np.broadcast_arrays(np.asarray(theta, dtype=np.float64), np.asarray(yaw, dtype=np.float64))
+        raise ArgumentError(
+            "height", height, f"a step between 0 and the wheel radius {wheel.radius:g} m"
+        )
+    t, y = np.broadcast_arrays(
+        np.asarray(theta, dtype=np.float64), np.asarray(yaw, dtype=np.float64)
+    )
     if not (np.all(np.isfinite(t)) and np.all((y >= -np.pi - 1e-12) & (y <= 1e-12))):
         raise ArgumentError("theta, yaw", (theta, yaw), "finite angles, yaw in [-pi, 0] rad")
     facing_lifted = np.cos(t) >= 0
-    return (t, y, np.cos(y), -np.sin(y), facing_lifted, np.where(facing_lifted, t + np.pi, t),
-            np.where(facing_lifted, t, t + np.pi))
+    return (
+        t,
+        y,
+        np.cos(y),
+        -np.sin(y),
+        facing_lifted,
+        np.where(facing_lifted, t + np.pi, t),
+        np.where(facing_lifted, t, t + np.pi),
+    )
 
 
 def _faces(wheel: DoubleWheel, facing_lifted: NDArray[np.bool_]) -> tuple[Array, Array]:
@@ -175,7 +235,8 @@ def _faces(wheel: DoubleWheel, facing_lifted: NDArray[np.bool_]) -> tuple[Array,
 
 
 def _reach(wheel: DoubleWheel, angle: Array, level: float, side: Array) -> Array:
-    """x (m) farthest to ``side`` (+1 front, -1 rear) of a hub's outline at or below ``level`` (m over the axle)."""
+    """x (m) farthest to ``side`` (+1 front, -1 rear) of a hub's outline at or below ``level`` (m
+    over the axle)."""
     a = side * angle  # the rear of a hub is the front of its mirror image
     s, c = np.sin(a), np.cos(a)
     on_circle = s >= 0
@@ -189,8 +250,11 @@ def _reach(wheel: DoubleWheel, angle: Array, level: float, side: Array) -> Array
     return np.asarray(side * np.where(tip_z <= level, tip, at_level))
 
 
-def _lower_boundary(wheel: DoubleWheel, angle: Array, x: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """z (m over the axle) and slope of a hub's lower boundary at ``x`` (m), and whether it reaches that far."""
+def _lower_boundary(
+    wheel: DoubleWheel, angle: Array, x: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """z (m over the axle) and slope of a hub's lower boundary at ``x`` (m), and whether it reaches
+    that far."""
     s, c = np.sin(angle), np.cos(angle)
     under = np.sqrt(np.maximum(wheel.radius**2 - x**2, 1e-300))
     on_circle = (x * s - under * c >= 0) & (np.abs(x) <= wheel.radius)
@@ -204,7 +268,8 @@ def _lower_boundary(wheel: DoubleWheel, angle: Array, x: Array) -> tuple[Array, 
 
 
 def _quadric(wheel: DoubleWheel, angle: Array) -> tuple[Array, Array, Array]:
-    """A, B, C of the turned ellipse A x^2 + 2 B x z + C z^2 = 1 (Eqn. 4.11, forward angles positive)."""
+    """A, B, C of the turned ellipse A x^2 + 2 B x z + C z^2 = 1 (Eqn. 4.11, forward angles
+    positive)."""
     s, c = np.sin(angle), np.cos(angle)
     a, b = 1 / wheel.radius**2, 1 / wheel.minor_radius**2
     return c * c * a + s * s * b, s * c * (b - a), s * s * a + c * c * b

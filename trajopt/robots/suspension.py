@@ -1,12 +1,13 @@
-"""Suspension travel of an ASOC module on a four-bar linkage (thesis 001, sections 3.1.3 and 3.4), and the
-point design of section 3.5.
+"""Suspension travel of an ASOC module on a four-bar linkage (thesis 001, sections 3.1.3 and 3.4),
+and the point design of section 3.5.
 
 Side view of a parallelogram: two parallel bars of one length between body and module, pivots one
-``spacing`` above the other, so the module axis stays vertical. Bar angle theta > 0 lifts the module. Three
-designs: straight bars; both bars bent upwards by ``arch`` near the wheels; bent bars whose upper one is split
-in two halves that pass beside the lower one. Two things end the travel: the lower bar on the wheels (at any
-alpha, so at the rim of the workspace circle), and bar on bar. The thesis draws the designs without sizes:
-the model is ours, and the default sizes are chosen for the point design.
+``spacing`` above the other, so the module axis stays vertical. Bar angle theta > 0 lifts the
+module. Three designs: straight bars; both bars bent upwards by ``arch`` near the wheels; bent bars
+whose upper one is split in two halves that pass beside the lower one. Two things end the travel:
+the lower bar on the wheels (at any alpha, so at the rim of the workspace circle), and bar on bar.
+The thesis draws the designs without sizes: the model is ours, and the default sizes are chosen for
+the point design.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from trajopt.robots.asoc import AsocGeometry, workspace_radius
 
 STEP_SHARE = 2.0 / 3.0  # share of the wheel diameter that should rise above a step (section 3.1.3)
 POINT_TRAVEL = 0.33  # m, thesis 001 section 3.5
-POINT_DESIGN = AsocGeometry(modules=4, split=0.21, offset=0.10, wheel_radius=0.163, wheel_width=0.03)
+POINT_DESIGN = AsocGeometry(
+    modules=4, split=0.21, offset=0.10, wheel_radius=0.163, wheel_width=0.03
+)
 LARGEST_ANGLE = np.radians(60.0)  # rad, stop of the bars' joints; chosen
 
 
@@ -36,9 +39,9 @@ class Linkage(Enum):
 
 @dataclass(frozen=True)
 class FourBar:
-    """Sizes of the linkage, m. ``length`` of the bars, ``spacing`` of their pivots, bar ``thickness``,
-    ``arch`` by which shaped bars rise beside the module, ``clearance`` from the highest point of a wheel to
-    the middle of the lower bar at theta = 0."""
+    """Sizes of the linkage, m. ``length`` of the bars, ``spacing`` of their pivots, bar
+    ``thickness``, ``arch`` by which shaped bars rise beside the module, ``clearance`` from the
+    highest point of a wheel to the middle of the lower bar at theta = 0."""
 
     length: float = 0.40  # chosen
     spacing: float = 0.10  # chosen
@@ -53,7 +56,9 @@ class FourBar:
         if not 0 <= self.arch < np.inf:
             raise ArgumentError("arch", self.arch, "a finite length >= 0 m")
         if self.spacing <= self.thickness:
-            raise ArgumentError("spacing", self.spacing, f"more than the bar thickness, {self.thickness} m")
+            raise ArgumentError(
+                "spacing", self.spacing, f"more than the bar thickness, {self.thickness} m"
+            )
 
 
 @dataclass(frozen=True)
@@ -74,29 +79,37 @@ def suspension_travel(linkage: Linkage, bars: FourBar, geometry: AsocGeometry) -
     """Largest travel up and down without interference at any module angle alpha."""
     up, up_end = _limit(linkage, bars, geometry, 1.0)
     down, down_end = _limit(linkage, bars, geometry, -1.0)
-    return Travel(float(bars.length * np.sin(up)), float(bars.length * np.sin(down)), up_end, down_end)
+    return Travel(
+        float(bars.length * np.sin(up)), float(bars.length * np.sin(down)), up_end, down_end
+    )
 
 
 def step_travel(step: float, wheel_radius: float) -> float:
-    """Suspension travel (m) that lifts a wheel onto a step: two thirds of the wheel's diameter above it."""
+    """Suspension travel (m) that lifts a wheel onto a step: two thirds of the wheel's diameter
+    above it."""
     if not (step >= 0 and wheel_radius > 0):
         raise ArgumentError("step", (step, wheel_radius), "a height >= 0 m and a radius > 0 m")
     return max(step - (1 - STEP_SHARE) * 2 * wheel_radius, 0.0)
 
 
-def _limit(linkage: Linkage, bars: FourBar, geometry: AsocGeometry, sign: float) -> tuple[float, str]:
+def _limit(
+    linkage: Linkage, bars: FourBar, geometry: AsocGeometry, sign: float
+) -> tuple[float, str]:
     """Largest |theta| in one direction and what ends it."""
     arch = 0.0 if linkage is Linkage.STRAIGHT else bars.arch
     reach = min(workspace_radius(geometry), bars.length)
 
     def wheel(theta: float) -> float:
-        """Gap between wheel and lower bar at the rim of the workspace; raising the module lowers the bar."""
+        """Gap between wheel and lower bar at the rim of the workspace; raising the module lowers
+        the bar."""
         drop = reach * np.tan(sign * theta)
-        return float(bars.clearance + arch * np.cos(theta) - drop - bars.thickness / 2 / np.cos(theta))
+        return float(
+            bars.clearance + arch * np.cos(theta) - drop - bars.thickness / 2 / np.cos(theta)
+        )
 
     def bar(theta: float) -> float:
-        """Gap between the bars: their distance shrinks by cos(theta); a bent lower bar takes its arch off
-        where the upper one is straight across it."""
+        """Gap between the bars: their distance shrinks by cos(theta); a bent lower bar takes its
+        arch off where the upper one is straight across it."""
         return float(bars.spacing * np.cos(theta) - arch - bars.thickness)
 
     ends: list[tuple[float, str]] = [(LARGEST_ANGLE, "stop"), (_first(wheel), "wheel")]
@@ -106,8 +119,8 @@ def _limit(linkage: Linkage, bars: FourBar, geometry: AsocGeometry, sign: float)
 
 
 def _first(gap: Callable[[float], float]) -> float:
-    """Smallest theta in [0, LARGEST_ANGLE] where a gap that shrinks with theta closes; inf where it never
-    does, 0 where it is closed from the start."""
+    """Smallest theta in [0, LARGEST_ANGLE] where a gap that shrinks with theta closes; inf where it
+    never does, 0 where it is closed from the start."""
     if gap(0.0) < 0:
         return 0.0
     if gap(LARGEST_ANGLE) >= 0:

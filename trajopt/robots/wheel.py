@@ -1,19 +1,21 @@
 """Rolling and sliding constraints of the five kinds of wheel (lecture 003).
 
-A wheel is described by the lecture's polar data: its centre (for a castor, its pivot) sits at distance
-``l`` and angle ``alpha`` in the body frame; ``beta`` turns the wheel plane so that the rolling direction
-is t = (sin(alpha + beta), -cos(alpha + beta)) and the axle n = (cos(alpha + beta), sin(alpha + beta));
-``gamma`` is the angle between the roller's rolling direction and the wheel plane (Swedish wheels);
-``radius`` is the wheel radius. A castor's wheel sits at ``offset`` along t from its pivot (negative: it
-trails) and at ``lateral`` along n, 0 for a single wheel and +-half the split for a split castor.
+A wheel is described by the lecture's polar data: its centre (for a castor, its pivot) sits at
+distance ``l`` and angle ``alpha`` in the body frame; ``beta`` turns the wheel plane so that the
+rolling direction is t = (sin(alpha + beta), -cos(alpha + beta)) and the axle n = (cos(alpha +
+beta), sin(alpha + beta)); ``gamma`` is the angle between the roller's rolling direction and the
+wheel plane (Swedish wheels); ``radius`` is the wheel radius. A castor's wheel sits at ``offset``
+along t from its pivot (negative: it trails) and at ``lateral`` along n, 0 for a single wheel and
++-half the split for a split castor.
 
 The rows act on the body twist (vx, vy, wz), in the body frame, and on the joint rates:
 
     rolling @ twist = spin_rolling * phi'  + steer_rolling * beta'
     sliding @ twist = spin_sliding * phi'  + steer_sliding * beta'  + free
 
-where ``free`` says that a passive roller (Swedish) or the ball (spherical) takes up the rest, so the row
-constrains nothing. Formulas are on component arrays, so angles may be NumPy arrays or CasADi expressions.
+where ``free`` says that a passive roller (Swedish) or the ball (spherical) takes up the rest, so
+the row constrains nothing. Formulas are on component arrays, so angles may be NumPy arrays or
+CasADi expressions.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ class WheelKind(Enum):
 
 @dataclass(frozen=True)
 class Row:
-    """One scalar constraint: (x, y, yaw) . twist = spin * phi' + steer * beta' (+ anything if free)."""
+    """One scalar constraint: (x, y, yaw) . twist = spin * phi' + steer * beta' (+ anything if
+    free)."""
 
     x: Any
     y: Any
@@ -53,8 +56,8 @@ class Row:
 class Wheel:
     """A wheel on a body: lengths in m, angles in rad, in the body frame (x forward, y left).
 
-    Raises ArgumentError for a radius that is not positive, a negative ``l``, or a Swedish wheel whose
-    rollers lie along the wheel plane (cos(gamma) = 0: the wheel could not drive).
+    Raises ArgumentError for a radius that is not positive, a negative ``l``, or a Swedish wheel
+    whose rollers lie along the wheel plane (cos(gamma) = 0: the wheel could not drive).
     """
 
     kind: WheelKind
@@ -76,7 +79,9 @@ class Wheel:
         if self.kind is WheelKind.CASTOR and not abs(self.offset) > 0:
             raise ArgumentError("offset", self.offset, "a castor arm different from 0 m")
         if self.kind is not WheelKind.CASTOR and self.lateral != 0:
-            raise ArgumentError("lateral", self.lateral, "0 m: only a castor's wheel stands beside its pivot")
+            raise ArgumentError(
+                "lateral", self.lateral, "0 m: only a castor's wheel stands beside its pivot"
+            )
 
     @property
     def position(self) -> tuple[float, float]:
@@ -84,22 +89,29 @@ class Wheel:
         return self.l * float(np.cos(self.alpha)), self.l * float(np.sin(self.alpha))
 
     def rolling(self, beta: Any = None) -> Row:
-        """Pure rolling along the wheel plane (003, eqs. for each kind). ``beta``: steering angle, rad.
+        """Pure rolling along the wheel plane (003, eqs. for each kind). ``beta``: steering angle,
+        rad.
 
-        A wheel beside its castor's pivot also rolls when the arm turns: its speed is less by lateral (wz + beta').
+        A wheel beside its castor's pivot also rolls when the arm turns: its speed is less by
+        lateral (wz + beta').
         """
         b = self.beta if beta is None else beta
         turn = b + (self.gamma if self.kind is WheelKind.SWEDISH else 0.0)
         spin = self.radius * np.cos(self.gamma) if self.kind is WheelKind.SWEDISH else self.radius
-        return Row(np.sin(self.alpha + turn), -np.cos(self.alpha + turn),
-                   -self.l * np.cos(turn) - self.lateral, spin, self.lateral)
+        return Row(
+            np.sin(self.alpha + turn),
+            -np.cos(self.alpha + turn),
+            -self.l * np.cos(turn) - self.lateral,
+            spin,
+            self.lateral,
+        )
 
     def sliding(self, beta: Any = None) -> Row:
         """No sideways slip (003). For Swedish and spherical wheels the row is free.
 
-        The castor's row carries its arm: [.., offset + l sin(beta)] twist + offset beta' = 0. The Swedish
-        row keeps the term - radius sin(gamma) phi' that the lecture's print lost, the spherical one its
-        l sin(beta).
+        The castor's row carries its arm: [.., offset + l sin(beta)] twist + offset beta' = 0. The
+        Swedish row keeps the term - radius sin(gamma) phi' that the lecture's print lost, the
+        spherical one its l sin(beta).
         """
         b = self.beta if beta is None else beta
         swedish = self.kind is WheelKind.SWEDISH
@@ -115,23 +127,32 @@ class Wheel:
         )
 
     def driving(self, beta: Any = None) -> Row:
-        """The rolling row once a castor's steering rate is taken from its sliding row: (x, y, yaw) . twist
-        = spin phi'. The rolling row itself for wheels that roll in the plane of their pivot."""
+        """The rolling row once a castor's steering rate is taken from its sliding row: (x, y, yaw)
+        . twist = spin phi'. The rolling row itself for wheels that roll in the plane of their
+        pivot."""
         roll = self.rolling(beta)
         if self.lateral == 0:
             return roll
         slide = self.sliding(beta)
         share = roll.steer / slide.steer
-        return Row(roll.x - share * slide.x, roll.y - share * slide.y, roll.yaw - share * slide.yaw, roll.spin)
+        return Row(
+            roll.x - share * slide.x,
+            roll.y - share * slide.y,
+            roll.yaw - share * slide.yaw,
+            roll.spin,
+        )
 
 
 def swedish_wheel(x: float, y: float, radius: float, gamma: float) -> Wheel:
     """Swedish wheel at (x, y), driving along the body's +x axis, rollers turned by ``gamma``.
 
-    With gamma = -45 deg the front-left wheel of a Mecanum platform obeys r phi' = vx - vy - (x + y) wz.
+    With gamma = -45 deg the front-left wheel of a Mecanum platform obeys r phi' = vx - vy - (x + y)
+    wz.
     """
     alpha = float(np.arctan2(y, x))
-    return Wheel(WheelKind.SWEDISH, float(np.hypot(x, y)), alpha, np.pi / 2 - alpha, radius, gamma=gamma)
+    return Wheel(
+        WheelKind.SWEDISH, float(np.hypot(x, y)), alpha, np.pi / 2 - alpha, radius, gamma=gamma
+    )
 
 
 def fixed_wheel(x: float, y: float, radius: float) -> Wheel:

@@ -38,11 +38,18 @@ CONTACT = "0.004 1"  # s and damping ratio: the shortest contact time that 2 ms 
 BASE = 0.5  # m of solid below the lowest point, chosen
 
 
-def asoc_in_mujoco(geometry: AsocGeometry, ground: HeightMap, reference: Reference, *, friction: float = 0.6,
-                   driven_pivots: bool = False, knowledge: Knowledge | None = None) -> AsocRun:
-    """Drive the robot along ``reference`` on ``ground``, everything known unless ``knowledge`` says otherwise.
-    Raises ArgumentError, SimulationError (the model cannot be built, explosion, tip-over) and
-    MissingDependencyError without mujoco."""
+def asoc_in_mujoco(
+    geometry: AsocGeometry,
+    ground: HeightMap,
+    reference: Reference,
+    *,
+    friction: float = 0.6,
+    driven_pivots: bool = False,
+    knowledge: Knowledge | None = None,
+) -> AsocRun:
+    """Drive the robot along ``reference`` on ``ground``, everything known unless ``knowledge`` says
+    otherwise. Raises ArgumentError, SimulationError (the model cannot be built, explosion,
+    tip-over) and MissingDependencyError without mujoco."""
     mujoco = load_mujoco()
     robot = AsocBody(geometry, friction, driven_pivots)
     try:
@@ -50,7 +57,9 @@ def asoc_in_mujoco(geometry: AsocGeometry, ground: HeightMap, reference: Referen
     except ValueError as error:
         raise SimulationError(f"mujoco could not build the robot: {error}") from error
     low, high = float(ground.heights.min()), float(ground.heights.max())
-    model.hfield_data[:] = ((ground.heights - low) / max(high - low, 1e-3)).astype(np.float32).ravel()
+    model.hfield_data[:] = (
+        ((ground.heights - low) / max(high - low, 1e-3)).astype(np.float32).ravel()
+    )
     data = mujoco.MjData(model)
     place, velocity = reference.at(0.0)
     lift = _start_height(robot, ground, place)
@@ -58,16 +67,32 @@ def asoc_in_mujoco(geometry: AsocGeometry, ground: HeightMap, reference: Referen
     for i in range(geometry.modules):
         data.joint(f"alpha{i}").qpos[0] = np.arctan2(velocity[1], velocity[0])
     mujoco.mj_forward(model, data)
-    session = _Session(mujoco, model, data, robot, tuple(
-        model.geom(f"wheel{i}{w}").id for i in range(geometry.modules) for w in (1, 2)), model.geom("ground").id)
-    return run_asoc(session, robot, ground, reference, label=("mujoco", importlib.metadata.version("mujoco")),
-                    knowledge=knowledge)
+    session = _Session(
+        mujoco,
+        model,
+        data,
+        robot,
+        tuple(model.geom(f"wheel{i}{w}").id for i in range(geometry.modules) for w in (1, 2)),
+        model.geom("ground").id,
+    )
+    return run_asoc(
+        session,
+        robot,
+        ground,
+        reference,
+        label=("mujoco", importlib.metadata.version("mujoco")),
+        knowledge=knowledge,
+    )
 
 
 def _start_height(robot: AsocBody, ground: HeightMap, place: Array) -> float:
     """Highest ground under the robot: it falls onto its springs from there."""
-    reach = np.linspace(-1.0, 1.0, 41) * (robot.geometry.module_radius + robot.geometry.offset
-                                          + robot.geometry.wheel_radius + robot.geometry.split)
+    reach = np.linspace(-1.0, 1.0, 41) * (
+        robot.geometry.module_radius
+        + robot.geometry.offset
+        + robot.geometry.wheel_radius
+        + robot.geometry.split
+    )
     return float(ground.height(place[0] + reach[:, None], place[1] + reach[None, :]).max())
 
 
@@ -80,9 +105,14 @@ def asoc_mjcf(robot: AsocBody, ground: HeightMap) -> str:
     modules = "".join(_module(robot, i) for i in range(robot.geometry.modules))
     motors = "".join(
         f'<velocity name="drive{i}{w}" joint="spin{i}{w}" kv="{WHEEL_GAIN}" forcerange="{-TORQUE} {TORQUE}"/>'
-        for i in range(robot.geometry.modules) for w in (1, 2))
+        for i in range(robot.geometry.modules)
+        for w in (1, 2)
+    )
     gain = PIVOT_GAIN if robot.driven_pivots else 0.0
-    pivots = "".join(f'<position name="tilt{i}" joint="beta{i}" kp="{gain}"/>' for i in range(robot.geometry.modules))
+    pivots = "".join(
+        f'<position name="tilt{i}" joint="beta{i}" kp="{gain}"/>'
+        for i in range(robot.geometry.modules)
+    )
     x, y, z = BODY_HALF
     return f"""<mujoco><compiler angle="radian"/>
 <option timestep="{STEP}" integrator="implicitfast" cone="elliptic" solver="Newton"
@@ -97,7 +127,8 @@ def asoc_mjcf(robot: AsocBody, ground: HeightMap) -> str:
 
 
 def _module(robot: AsocBody, i: int) -> str:
-    """One module: spring, module axis, axle pivot, two wheels (thin ellipsoids touch at one point)."""
+    """One module: spring, module axis, axle pivot, two wheels (thin ellipsoids touch at one
+    point)."""
     g = robot.geometry
     px, py = g.positions[i]
     drop = g.wheel_radius - BODY_HEIGHT  # of the axle below the plate's middle
@@ -107,7 +138,8 @@ def _module(robot: AsocBody, i: int) -> str:
         f'{_wheel_inertia(robot, 1):.6g} {_wheel_inertia(robot, 0):.6g} {_wheel_inertia(robot, 1):.6g}"/>'
         f'<geom name="wheel{i}{w}" type="ellipsoid" size="{g.wheel_radius} {g.wheel_width / 2} {g.wheel_radius}"'
         ' contype="2" conaffinity="1"/></body>'
-        for w, side in ((1, -1), (2, 1)))
+        for w, side in ((1, -1), (2, 1))
+    )
     half = robot.link_mass
     return f"""<body pos="{px} {py} {drop + SAG}">
 <joint name="lift{i}" type="slide" axis="0 0 1" stiffness="{robot.stiffness}" damping="{robot.damping}"
@@ -144,9 +176,19 @@ class _Session:
 
     def state(self) -> AsocState:
         body = self.data.body("body")
-        alpha = np.array([float(self.data.joint(f"alpha{i}").qpos[0]) for i in range(self.robot.geometry.modules)])
-        spins = np.array([float(self.data.joint(f"spin{i}{w}").qvel[0])
-                          for i in range(self.robot.geometry.modules) for w in (1, 2)]).reshape(-1, 2)
+        alpha = np.array(
+            [
+                float(self.data.joint(f"alpha{i}").qpos[0])
+                for i in range(self.robot.geometry.modules)
+            ]
+        )
+        spins = np.array(
+            [
+                float(self.data.joint(f"spin{i}{w}").qvel[0])
+                for i in range(self.robot.geometry.modules)
+                for w in (1, 2)
+            ]
+        ).reshape(-1, 2)
         pairs = self.data.contact.geom
         near = pairs[self.data.contact.dist <= 0.0]
         touched = np.unique(near[np.any(near == self.ground, axis=1)]) if len(near) else np.zeros(0)

@@ -1,8 +1,10 @@
-"""The robot on split offset casters in a physics engine: what both engines share (thesis 001, section 4.3).
+"""The robot on split offset casters in a physics engine: what both engines share (thesis 001,
+section 4.3).
 
-Robot: a body plate, N modules on vertical springs, each free to turn (alpha), its axle pivoted (beta, passive
-or driven), two driven wheels. Masses are the thesis's shares of 65 kg; what it does not print is chosen.
-The controller is that of trajopt.control.asoc_tracking; wheels follow velocity commands.
+Robot: a body plate, N modules on vertical springs, each free to turn (alpha), its axle pivoted
+(beta, passive or driven), two driven wheels. Masses are the thesis's shares of 65 kg; what it does
+not print is chosen. The controller is that of trajopt.control.asoc_tracking; wheels follow velocity
+commands.
 """
 
 from __future__ import annotations
@@ -40,7 +42,9 @@ BODY_HEIGHT = 0.25  # m of the plate's middle above the ground, chosen
 SAG = 0.03  # m of the springs under the robot's weight, chosen
 DAMPING_RATIO = 0.7  # of the springs, chosen
 TRAVEL = 0.15  # m of each module up and down, chosen: about half of section 3.5's 0.33 m
-TORQUE = 10.0  # N m a wheel, chosen: twice what friction 0.6 can take at a wheel's share of the weight
+TORQUE = (
+    10.0  # N m a wheel, chosen: twice what friction 0.6 can take at a wheel's share of the weight
+)
 WHEEL_GAIN = 7.3  # N m s/rad, K_p of section 4.3 (unit inferred)
 PIVOT_GAIN = 60.0  # N m/rad of driven pivots, chosen
 ALPHA_DAMPING = 0.05  # N m s/rad of the module axes, chosen
@@ -59,7 +63,9 @@ class AsocBody:
         if not (np.isfinite(self.friction) and self.friction > 0):
             raise ArgumentError("friction", self.friction, "a friction coefficient > 0")
         if self.body_mass <= 0:
-            raise ArgumentError("geometry", self.geometry, f"wheels that leave mass out of {TOTAL_MASS} kg")
+            raise ArgumentError(
+                "geometry", self.geometry, f"wheels that leave mass out of {TOTAL_MASS} kg"
+            )
 
     @property
     def wheel_mass(self) -> float:
@@ -69,7 +75,8 @@ class AsocBody:
 
     @property
     def link_mass(self) -> float:
-        """kg of a module's link; its axle weighs the same: together the thesis's 5 % of the total."""
+        """kg of a module's link; its axle weighs the same: together the thesis's 5 % of the
+        total."""
         return MODULE_SHARE * TOTAL_MASS / 2
 
     @property
@@ -84,7 +91,11 @@ class AsocBody:
     @property
     def damping(self) -> float:
         """N s/m of a module's spring."""
-        return 2 * DAMPING_RATIO * float(np.sqrt(self.stiffness * self.body_mass / self.geometry.modules))
+        return (
+            2
+            * DAMPING_RATIO
+            * float(np.sqrt(self.stiffness * self.body_mass / self.geometry.modules))
+        )
 
     @property
     def pivot_range(self) -> float:
@@ -95,8 +106,8 @@ class AsocBody:
 
 @dataclass(frozen=True, eq=False)
 class AsocState:
-    """``position`` (3,) m of the body plate, its ``rotation`` (3, 3), module angles ``alpha`` (N,) rad, wheel
-    ``spins`` (N, 2) rad/s, and which wheels ``touch`` the ground (N, 2)."""
+    """``position`` (3,) m of the body plate, its ``rotation`` (3, 3), module angles ``alpha`` (N,)
+    rad, wheel ``spins`` (N, 2) rad/s, and which wheels ``touch`` the ground (N, 2)."""
 
     position: Array
     rotation: Array
@@ -109,7 +120,8 @@ class AsocSession(Protocol):
     """A robot in an engine."""
 
     def advance(self, wheel_speeds: Array, pivots: Array) -> None:
-        """One step with wheel speed targets (N, 2) rad/s and, where pivots are driven, tilts (N,) rad."""
+        """One step with wheel speed targets (N, 2) rad/s and, where pivots are driven, tilts (N,)
+        rad."""
         ...
 
     def state(self) -> AsocState:
@@ -119,8 +131,8 @@ class AsocSession(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class AsocRun:
-    """A run: ``times`` (n,) s, ``pose`` (n, 3) x, y (m), yaw (rad), ``roll_pitch`` (n, 2) rad, ``touch``
-    (n, W), the ``wanted`` position (n, 2) and the distance from the path (n,), m."""
+    """A run: ``times`` (n,) s, ``pose`` (n, 3) x, y (m), yaw (rad), ``roll_pitch`` (n, 2) rad,
+    ``touch`` (n, W), the ``wanted`` position (n, 2) and the distance from the path (n,), m."""
 
     engine: str
     version: str
@@ -153,11 +165,19 @@ class AsocRun:
         return float(1.0 - self.touch.mean())
 
 
-def run_asoc(session: AsocSession, robot: AsocBody, ground: HeightMap, reference: Reference, *,
-             label: tuple[str, str], knowledge: Knowledge | None = None) -> AsocRun:
-    """Settle, then drive along ``reference``; pose and ground are known unless ``knowledge`` says otherwise
-    (between updates the pose is that of odometry, from wheel speeds and module angles). Raises
-    SimulationError when the numbers leave physics, the robot tips over or leaves the height map."""
+def run_asoc(
+    session: AsocSession,
+    robot: AsocBody,
+    ground: HeightMap,
+    reference: Reference,
+    *,
+    label: tuple[str, str],
+    knowledge: Knowledge | None = None,
+) -> AsocRun:
+    """Settle, then drive along ``reference``; pose and ground are known unless ``knowledge`` says
+    otherwise (between updates the pose is that of odometry, from wheel speeds and module angles).
+    Raises SimulationError when the numbers leave physics, the robot tips over or leaves the height
+    map."""
     known = knowledge or Knowledge()
     geometry, still = robot.geometry, np.zeros((robot.geometry.modules, 2))
     begun = time.perf_counter()
@@ -187,17 +207,29 @@ def run_asoc(session: AsocSession, robot: AsocBody, ground: HeightMap, reference
     pose, lean, touch, wanted = (np.array(column) for column in zip(*rows, strict=True))
     pose[:, 2] = np.unwrap(pose[:, 2])
     times = np.asarray(control * np.arange(len(rows)), dtype=np.float64)
-    return AsocRun(label[0], label[1], times, pose, lean, touch.astype(bool), wanted,
-                   reference.distance(pose[:, :2]), time.perf_counter() - begun)
+    return AsocRun(
+        label[0],
+        label[1],
+        times,
+        pose,
+        lean,
+        touch.astype(bool),
+        wanted,
+        reference.distance(pose[:, :2]),
+        time.perf_counter() - begun,
+    )
 
 
 def _require_ground(pose: Array, robot: AsocBody, ground: HeightMap, moment: float) -> None:
-    """SimulationError where the module axes no longer stand over the map: the engines have nothing beyond it."""
+    """SimulationError where the module axes no longer stand over the map: the engines have nothing
+    beyond it."""
     low = np.array(ground.origin) + robot.geometry.module_radius
     high = low + np.array(ground.size) - 2 * robot.geometry.module_radius
     if np.any(pose[:2] < low) or np.any(pose[:2] > high):
-        raise SimulationError(f"the robot left the height map {moment:.3g} s after the start, at "
-                              f"({pose[0]:.3g}, {pose[1]:.3g}) m; take a larger map")
+        raise SimulationError(
+            f"the robot left the height map {moment:.3g} s after the start, at "
+            f"({pose[0]:.3g}, {pose[1]:.3g}) m; take a larger map"
+        )
 
 
 def _pose(now: AsocState, moment: float) -> tuple[Array, Array]:
@@ -207,6 +239,8 @@ def _pose(now: AsocState, moment: float) -> tuple[Array, Array]:
         raise SimulationError(f"the state is not finite {moment:.3g} s after the start")
     roll, pitch = float(np.arctan2(r[2, 1], r[2, 2])), float(-np.arcsin(np.clip(r[2, 0], -1, 1)))
     if max(abs(roll), abs(pitch)) > LARGEST_TILT:
-        raise SimulationError(f"the robot tipped over {moment:.3g} s after the start, at "
-                              f"({now.position[0]:.3g}, {now.position[1]:.3g}) m")
+        raise SimulationError(
+            f"the robot tipped over {moment:.3g} s after the start, at "
+            f"({now.position[0]:.3g}, {now.position[1]:.3g}) m"
+        )
     return np.array([*now.position[:2], np.arctan2(r[1, 0], r[0, 0])]), np.array([roll, pitch])

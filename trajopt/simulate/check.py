@@ -27,11 +27,12 @@ COAST = 0.5  # s after the last command in which the robot comes to rest; chosen
 class ValidationReport:
     """How far the simulated motion is from the plan. Angles rad, lengths m.
 
-    ``along`` and ``across``: final position error along and across the planned final direction of travel;
-    ``yaw``: final heading error; ``wheel_deviation`` (4,): final wheel angle minus planned;
-    ``path_rms`` and ``path_max``: distance from the planned position at the same time, until the plan ends (what a
-    controller bends on purpose counts too). ``planned`` (N, 3) are the planned poses at the recording's times.
-    ``control`` and ``seed`` say what was switched on; None: the planned wheel speeds.
+    ``along`` and ``across``: final position error along and across the planned final direction of
+    travel; ``yaw``: final heading error; ``wheel_deviation`` (4,): final wheel angle minus planned;
+    ``path_rms`` and ``path_max``: distance from the planned position at the same time, until the
+    plan ends (what a controller bends on purpose counts too). ``planned`` (N, 3) are the planned
+    poses at the recording's times. ``control`` and ``seed`` say what was switched on; None: the
+    planned wheel speeds.
     """
 
     engine: str
@@ -55,14 +56,21 @@ class ValidationReport:
 
 
 def drive_trajectory(
-    trajectory: Trajectory, problem: Problem, *, engine: str = "pybullet", picture: bool = False,
-    control: Mode | None = None, seed: int = 0
+    trajectory: Trajectory,
+    problem: Problem,
+    *,
+    engine: str = "pybullet",
+    picture: bool = False,
+    control: Mode | None = None,
+    seed: int = 0,
 ) -> ValidationReport:
-    """On flat ground, LOC8 with Mecanum rollers: at the planned wheel speeds, or under an approach controller.
+    """On flat ground, LOC8 with Mecanum rollers: at the planned wheel speeds, or under an approach
+    controller.
 
-    With ``control`` the pose is measured as ``Sensors`` says, blurred by random numbers of ``seed``, and the plan that
-    the motion is compared with is timed as the controller wants it. Raises SimulationError when the run leaves
-    physics, ArgumentError for a seed below 0 or where the controller refuses the trajectory.
+    With ``control`` the pose is measured as ``Sensors`` says, blurred by random numbers of
+    ``seed``, and the plan that the motion is compared with is timed as the controller wants it.
+    Raises SimulationError when the run leaves physics, ArgumentError for a seed below 0 or where
+    the controller refuses the trajectory.
     """
     if seed < 0:
         raise ArgumentError("seed", seed, "a whole number >= 0")
@@ -82,37 +90,60 @@ def drive_trajectory(
     )
     recording = _run(engine, problem, command, picture, None)
     plan = trajectory.at(np.minimum(recording.times, trajectory.duration))
-    return _compared(plan.pose, np.asarray(problem.start.wheels) + plan.wheel_angles[-1], recording,
-                     trajectory.duration)
+    return _compared(
+        plan.pose,
+        np.asarray(problem.start.wheels) + plan.wheel_angles[-1],
+        recording,
+        trajectory.duration,
+    )
 
 
-def _controlled(trajectory: Trajectory, problem: Problem, engine: str, picture: bool, control: Mode,
-                seed: int) -> ValidationReport:
+def _controlled(
+    trajectory: Trajectory, problem: Problem, engine: str, picture: bool, control: Mode, seed: int
+) -> ValidationReport:
     start = np.asarray(problem.start.wheels, dtype=np.float64)
-    controller = approach_controller(trajectory, robot_named(problem.robot.name), start, problem.goal.critical_indices,
-                                     cap=problem.limits.wheel_speed or np.inf, mode=control,
-                                     rng=np.random.default_rng(seed))
+    controller = approach_controller(
+        trajectory,
+        robot_named(problem.robot.name),
+        start,
+        problem.goal.critical_indices,
+        cap=problem.limits.wheel_speed or np.inf,
+        mode=control,
+        rng=np.random.default_rng(seed),
+    )
     reference = controller.reference
-    command = Command(np.array([0.0, reference.times[-1] + SETTLE]), np.zeros((2, 4)), _triple(reference.pose[0]),
-                      _four(problem.start.wheels))
+    command = Command(
+        np.array([0.0, reference.times[-1] + SETTLE]),
+        np.zeros((2, 4)),
+        _triple(reference.pose[0]),
+        _four(problem.start.wheels),
+    )
     recording = _run(engine, problem, command, picture, steered(controller))
-    planned = np.column_stack([np.interp(recording.times, reference.times, column) for column in reference.pose.T])
+    planned = np.column_stack(
+        [np.interp(recording.times, reference.times, column) for column in reference.pose.T]
+    )
     report = _compared(planned, reference.wheels[-1], recording, float(reference.times[-1]))
     return replace(report, control=control, seed=seed)
 
 
-def _run(engine: str, problem: Problem, command: Command, picture: bool,
-         controller: Controller | None) -> Recording:
-    recording = make_engine(engine).run(loc8_mecanum(), Scene(problem.scene.friction), command, controller=controller,
-                                        picture=Camera() if picture else None)
+def _run(
+    engine: str, problem: Problem, command: Command, picture: bool, controller: Controller | None
+) -> Recording:
+    recording = make_engine(engine).run(
+        loc8_mecanum(),
+        Scene(problem.scene.friction),
+        command,
+        controller=controller,
+        picture=Camera() if picture else None,
+    )
     if recording.exploded:
         raise SimulationError(f"{engine}: the simulation left physics: {recording.reason}")
     return recording
 
 
 def _compared(planned: Array, wheels: Array, recording: Recording, end: float) -> ValidationReport:
-    """Against the planned poses (N, 3) at the recording's times and the planned final wheel angles (4,); the plan
-    ends at ``end`` (s)."""
+    """Against the planned poses (N, 3) at the recording's times and the planned final wheel angles
+    (4,); the plan ends at ``end`` (s)."""
     error = recording.pose - planned
     distance = np.hypot(error[:, 0], error[:, 1])[recording.times <= end]
     heading = _final_direction(planned)
@@ -141,7 +172,8 @@ def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
 
 
 def _final_direction(poses: Array) -> float:
-    """Direction of travel over the last 2 cm (rad), or over the whole motion where it is shorter than that."""
+    """Direction of travel over the last 2 cm (rad), or over the whole motion where it is shorter
+    than that."""
     before = np.flatnonzero(np.hypot(*(poses[:, :2] - poses[-1, :2]).T) > 0.02)
     x, y = poses[-1, :2] - poses[before[-1] if before.size else 0, :2]
     return float(np.arctan2(y, x))

@@ -1,8 +1,8 @@
 """Climb trials: drive a robot against a step and see which wheels get up (SMDW thesis, chapter 6).
 
-Sub-test 1 executes an approach open loop (or with a controller); sub-test 2 starts at the state that was reached and
-drives 2 s at 8.5 rad/s against the step. A wheel is up when its centre has risen by 0.7 of the step's height.
-A run that leaves physics is counted apart and never averaged in.
+Sub-test 1 executes an approach open loop (or with a controller); sub-test 2 starts at the state
+that was reached and drives 2 s at 8.5 rad/s against the step. A wheel is up when its centre has
+risen by 0.7 of the step's height. A run that leaves physics is counted apart and never averaged in.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ def _built(sizes: DoubleWheel, torque: float) -> SimRobot:
 
 @dataclass(frozen=True)
 class StepScene:
-    """The step, what it is made of, and the robot's drives: lengths m, ``friction`` [-], ``torque`` N m a wheel."""
+    """The step, what it is made of, and the robot's drives: lengths m, ``friction`` [-], ``torque``
+    N m a wheel."""
 
     height: float
     place: tuple[float, float]
@@ -65,10 +66,12 @@ class StepScene:
 
 @dataclass(frozen=True)
 class Climb:
-    """Sub-test 2 from ``pose`` (m, m, rad) with ``wheels`` (rad): drive along ``motion``, a unit vector in the body.
+    """Sub-test 2 from ``pose`` (m, m, rad) with ``wheels`` (rad): drive along ``motion``, a unit
+    vector in the body.
 
-    ``critical`` are the wheels (0 = front-left) that meet the step first, ``travel`` (m) what they have to
-    roll until then. ``speed`` (rad/s) at the wheels; a slower climb gets more time for the same distance.
+    ``critical`` are the wheels (0 = front-left) that meet the step first, ``travel`` (m) what they
+    have to roll until then. ``speed`` (rad/s) at the wheels; a slower climb gets more time for the
+    same distance.
     """
 
     step: StepScene
@@ -82,9 +85,9 @@ class Climb:
 
 @dataclass(frozen=True)
 class Outcome:
-    """``up``: wheels that stayed up to the end. ``first_attempt``: the leading wheels came up within half a turn of
-    meeting the step. ``exploded`` with its ``reason``: the run left physics, and the rest does not count.
-    ``yaw_change`` (rad) over the climb."""
+    """``up``: wheels that stayed up to the end. ``first_attempt``: the leading wheels came up
+    within half a turn of meeting the step. ``exploded`` with its ``reason``: the run left physics,
+    and the rest does not count. ``yaw_change`` (rad) over the climb."""
 
     up: tuple[bool, bool, bool, bool]
     critical_up: bool
@@ -117,7 +120,8 @@ class Rate:
 
 
 def wilson(successes: int, trials: int, z: float = 1.959963984540054) -> tuple[float, float]:
-    """Wilson's score interval of a binomial share (Wilson 1927); (0, 1) without trials. ``z``: 95 %, two-sided.
+    """Wilson's score interval of a binomial share (Wilson 1927); (0, 1) without trials. ``z``: 95
+    %, two-sided.
 
     Raises ArgumentError unless 0 <= successes <= trials.
     """
@@ -127,7 +131,11 @@ def wilson(successes: int, trials: int, z: float = 1.959963984540054) -> tuple[f
         return 0.0, 1.0
     share, square = successes / trials, z * z
     middle = (share + square / (2 * trials)) / (1 + square / trials)
-    half = z / (1 + square / trials) * math.sqrt(share * (1 - share) / trials + square / (4 * trials**2))
+    half = (
+        z
+        / (1 + square / trials)
+        * math.sqrt(share * (1 - share) / trials + square / (4 * trials**2))
+    )
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
@@ -166,15 +174,29 @@ def judge(climb: Climb, recording: Recording) -> Outcome:
         if not lateral:  # forward, the second wheel meets the step while the first one is climbing
             break
     both = up[climb.critical[0]] and up[climb.critical[1]]
-    return Outcome((up[0], up[1], up[2], up[3]), both, first, False, "",
-                   float(recording.pose[-1, 2] - recording.pose[0, 2]))
+    return Outcome(
+        (up[0], up[1], up[2], up[3]),
+        both,
+        first,
+        False,
+        "",
+        float(recording.pose[-1, 2] - recording.pose[0, 2]),
+    )
 
 
-def run_approach(step: StepScene, command: Command, *, engine: str = "mujoco",
-                 controller: Controller | None = None, rest: float = COAST) -> Recording:
-    """Sub-test 1: execute an approach (its wheel speeds, or a controller) with the step standing there.
+def run_approach(
+    step: StepScene,
+    command: Command,
+    *,
+    engine: str = "mujoco",
+    controller: Controller | None = None,
+    rest: float = COAST,
+) -> Recording:
+    """Sub-test 1: execute an approach (its wheel speeds, or a controller) with the step standing
+    there.
 
-    An approach ends at rest, so the run ends ``rest`` seconds after it; TIMEOUT bounds that without a controller.
+    An approach ends at rest, so the run ends ``rest`` seconds after it; TIMEOUT bounds that without
+    a controller.
     """
     extra = rest if controller is not None else min(rest, (TIMEOUT - 1.0) * command.duration)
     end = command.duration
@@ -191,7 +213,9 @@ def reached(recording: Recording) -> tuple[tuple[float, float, float], Four]:
     return (x, y, yaw), (a, b, c, d)
 
 
-def climb_all(climbs: Sequence[Climb], *, engine: str = "mujoco", workers: int = 1) -> list[Outcome]:
+def climb_all(
+    climbs: Sequence[Climb], *, engine: str = "mujoco", workers: int = 1
+) -> list[Outcome]:
     """Outcomes in the order of ``climbs``, the same whatever the number of worker processes."""
     return list(_mapped(climbs, engine, workers))
 

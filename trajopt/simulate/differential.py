@@ -1,7 +1,8 @@
-"""A differential drive in pybullet: open or closed loop along a plan, with wheel slip measured at the contact.
+"""A differential drive in pybullet: open or closed loop along a plan, with wheel slip measured at
+the contact.
 
-Beside the roller-level engines, whose contract is made for four wheels with rollers. The floor is flat, or
-carries the ramps of a path problem (rounded as the plan knows them) and walls.
+Beside the roller-level engines, whose contract is made for four wheels with rollers. The floor is
+flat, or carries the ramps of a path problem (rounded as the plan knows them) and walls.
 """
 
 from __future__ import annotations
@@ -72,10 +73,11 @@ class DriveOptions:
 
 @dataclass(frozen=True, eq=False)
 class DriveRecord:
-    """Every ``control`` seconds: ``times`` (N,), ``pose`` (N, 3), ``speed`` (N,) along the heading, ``planned``
-    (N, 3) poses and ``planned_speed`` (N,); ``slip`` (N, 2) speed of each drive wheel's contact point over the
-    floor, m/s (largest since the record before); ``load`` (N, 4) normal forces, N (drive left, right, caster
-    left, right; means); ``pitch`` (N,) rad; ``touched`` whether a wall was met."""
+    """Every ``control`` seconds: ``times`` (N,), ``pose`` (N, 3), ``speed`` (N,) along the heading,
+    ``planned`` (N, 3) poses and ``planned_speed`` (N,); ``slip`` (N, 2) speed of each drive wheel's
+    contact point over the floor, m/s (largest since the record before); ``load`` (N, 4) normal
+    forces, N (drive left, right, caster left, right; means); ``pitch`` (N,) rad; ``touched``
+    whether a wall was met."""
 
     times: Array
     pose: Array
@@ -113,28 +115,41 @@ class DriveRecord:
         return float(np.sqrt(np.mean((self.speed - self.planned_speed) ** 2)))
 
 
-def drive_in_pybullet(trajectory: Trajectory, robot: DriveRobot, floor: Floor, *, tracker: Tracker | None = None,
-                      options: DriveOptions | None = None, faster: float = 1.0,
-                      start_error: Sequence[float] = (0.0, 0.0, 0.0)) -> DriveRecord:
+def drive_in_pybullet(
+    trajectory: Trajectory,
+    robot: DriveRobot,
+    floor: Floor,
+    *,
+    tracker: Tracker | None = None,
+    options: DriveOptions | None = None,
+    faster: float = 1.0,
+    start_error: Sequence[float] = (0.0, 0.0, 0.0),
+) -> DriveRecord:
     """Drive the plan in Bullet: closed loop with a ``tracker``, open loop without.
 
-    ``faster`` runs the plan's time by that factor quicker: forces grow with its square. ``start_error`` is in
-    the body frame (m, m, rad). Raises MissingDependencyError without pybullet, SimulationError when the numbers
-    leave physics, ArgumentError for a factor that is not positive.
+    ``faster`` runs the plan's time by that factor quicker: forces grow with its square.
+    ``start_error`` is in the body frame (m, m, rad). Raises MissingDependencyError without
+    pybullet, SimulationError when the numbers leave physics, ArgumentError for a factor that is not
+    positive.
     """
     if not (np.isfinite(faster) and faster > 0):
         raise ArgumentError("faster", faster, "a finite factor > 0")
     options = DriveOptions() if options is None else options
     start = trajectory.at(0.0).pose[0]
     cos, sin = np.cos(start[2]), np.sin(start[2])
-    start += [cos * start_error[0] - sin * start_error[1], sin * start_error[0] + cos * start_error[1],
-              start_error[2]]
+    start += [
+        cos * start_error[0] - sin * start_error[1],
+        sin * start_error[0] + cos * start_error[1],
+        start_error[2],
+    ]
     with drive_session(robot, floor, options, start) as session:
         return _drive(session, trajectory, robot, tracker, options, faster)
 
 
 @contextmanager
-def drive_session(robot: DriveRobot, floor: Floor, options: DriveOptions, start: Array) -> Iterator[DriveSession]:
+def drive_session(
+    robot: DriveRobot, floor: Floor, options: DriveOptions, start: Array
+) -> Iterator[DriveSession]:
     """A robot that has come to rest on the floor at ``start`` (3,): x, y (m), yaw (rad).
 
     Raises MissingDependencyError without pybullet.
@@ -162,11 +177,13 @@ class DriveSession:
     robot: DriveRobot
     joints: tuple[int, int, int, int]
 
-    def interval(self, before: tuple[float, float], after: tuple[float, float],
-                 steps: int) -> tuple[Array, Array, bool]:
-        """One control interval: left and right wheel speed (m/s) go evenly from ``before`` to ``after``, since a
-        jump would tear the wheels loose. Largest slip (2,) of the drive wheels, m/s, mean loads (4,), N, and
-        whether a wall was met. Raises SimulationError when the numbers leave physics."""
+    def interval(
+        self, before: tuple[float, float], after: tuple[float, float], steps: int
+    ) -> tuple[Array, Array, bool]:
+        """One control interval: left and right wheel speed (m/s) go evenly from ``before`` to
+        ``after``, since a jump would tear the wheels loose. Largest slip (2,) of the drive wheels,
+        m/s, mean loads (4,), N, and whether a wall was met. Raises SimulationError when the numbers
+        leave physics."""
         slip, load, touched = np.zeros(2), np.zeros(4), False
         for i in range(steps):
             share = (i + 0.5) / steps
@@ -181,24 +198,35 @@ class DriveSession:
     def advance(self, left: float, right: float) -> None:
         radius = self.robot.radius
         self.bullet.setJointMotorControlArray(
-            self.body, self.joints[:2], self.bullet.VELOCITY_CONTROL, targetVelocities=[left / radius, right / radius],
-            forces=[self.robot.torque_limit] * 2, physicsClientId=self.client)
+            self.body,
+            self.joints[:2],
+            self.bullet.VELOCITY_CONTROL,
+            targetVelocities=[left / radius, right / radius],
+            forces=[self.robot.torque_limit] * 2,
+            physicsClientId=self.client,
+        )
         self.bullet.stepSimulation(physicsClientId=self.client)
 
     def pose(self) -> tuple[Array, float, float]:
         """x, y, yaw of the body origin; speed along the heading; pitch."""
-        where, attitude = self.bullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        where, attitude = self.bullet.getBasePositionAndOrientation(
+            self.body, physicsClientId=self.client
+        )
         linear, angular = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
         rotation = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
         arm = rotation @ -np.array(self.robot.chassis_cog)
         origin = np.array(where) + arm
         velocity = np.array(linear) + np.cross(angular, arm)
         yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
-        return (np.array([origin[0], origin[1], yaw]), float(velocity @ rotation[:, 0]),
-                float(-np.arcsin(np.clip(rotation[2, 0], -1.0, 1.0))))
+        return (
+            np.array([origin[0], origin[1], yaw]),
+            float(velocity @ rotation[:, 0]),
+            float(-np.arcsin(np.clip(rotation[2, 0], -1.0, 1.0))),
+        )
 
     def contacts(self) -> tuple[Array, Array, bool]:
-        """Slip speed of the two drive wheels (m/s), loads of wheels and casters (N), whether a wall is met."""
+        """Slip speed of the two drive wheels (m/s), loads of wheels and casters (N), whether a wall
+        is met."""
         slip, load, touched = np.zeros(2), np.zeros(4), False
         for point in self.bullet.getContactPoints(bodyA=self.body, physicsClientId=self.client):
             other, link, force = point[2], point[3], point[9]
@@ -211,16 +239,26 @@ class DriveSession:
             wheel = self.joints.index(link)
             load[wheel] += force
             if wheel < 2:
-                state = self.bullet.getLinkState(self.body, link, computeLinkVelocity=1, physicsClientId=self.client)
+                state = self.bullet.getLinkState(
+                    self.body, link, computeLinkVelocity=1, physicsClientId=self.client
+                )
                 arm = np.array(point[5]) - np.array(state[0])
                 velocity = np.array(state[6]) + np.cross(state[7], arm)
                 normal = np.array(point[7])
-                slip[wheel] = max(slip[wheel], float(np.linalg.norm(velocity - (velocity @ normal) * normal)))
+                slip[wheel] = max(
+                    slip[wheel], float(np.linalg.norm(velocity - (velocity @ normal) * normal))
+                )
         return slip, load, touched
 
 
-def _drive(session: DriveSession, trajectory: Trajectory, robot: DriveRobot, tracker: Tracker | None,
-           options: DriveOptions, faster: float) -> DriveRecord:
+def _drive(
+    session: DriveSession,
+    trajectory: Trajectory,
+    robot: DriveRobot,
+    tracker: Tracker | None,
+    options: DriveOptions,
+    faster: float,
+) -> DriveRecord:
     width = 2 * abs(robot.platform.body.contacts[0][1])
     substeps = max(round(options.control / options.step), 1)
     total = trajectory.duration / faster
@@ -241,52 +279,104 @@ def _drive(session: DriveSession, trajectory: Trajectory, robot: DriveRobot, tra
         if k == count:
             break
         v, w = float(twist[k + 1, 0]), float(twist[k + 1, 2])  # reached at the end of the interval
-        order = ((v - w * width / 2, v + w * width / 2) if tracker is None
-                 else tracker.wheel_speeds(at.pose[k], (v, w), pose, width))
+        order = (
+            (v - w * width / 2, v + w * width / 2)
+            if tracker is None
+            else tracker.wheel_speeds(at.pose[k], (v, w), pose, width)
+        )
         slip, load, met = session.interval(last, order, substeps)
         last, touched = order, touched or met
     pose_array = np.array(poses)
     pose_array[:, 2] = np.unwrap(pose_array[:, 2])
-    return DriveRecord(times, pose_array, np.array(speeds), at.pose, planned_speed, np.array(slips), np.array(loads),
-                       np.array(pitches), touched)
+    return DriveRecord(
+        times,
+        pose_array,
+        np.array(speeds),
+        at.pose,
+        planned_speed,
+        np.array(slips),
+        np.array(loads),
+        np.array(pitches),
+        touched,
+    )
 
 
-def _session(bullet: Any, client: int, robot: DriveRobot, floor: Floor, options: DriveOptions,
-             start: Array) -> DriveSession:
+def _session(
+    bullet: Any, client: int, robot: DriveRobot, floor: Floor, options: DriveOptions, start: Array
+) -> DriveSession:
     bullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
     bullet.setPhysicsEngineParameter(
-        fixedTimeStep=options.step, numSolverIterations=options.iterations, contactBreakingThreshold=0.005,
-        enableFileCaching=0, deterministicOverlappingPairs=1, physicsClientId=client)
+        fixedTimeStep=options.step,
+        numSolverIterations=options.iterations,
+        contactBreakingThreshold=0.005,
+        enableFileCaching=0,
+        deterministicOverlappingPairs=1,
+        physicsClientId=client,
+    )
     plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
     ground = [bullet.createMultiBody(0.0, plane, physicsClientId=client)]
     ground += [_ramp(bullet, client, ramp) for ramp in floor.ramps]
     walls = [_wall(bullet, client, wall) for wall in floor.walls]
     for solid in (*ground, *walls):
-        bullet.changeDynamics(solid, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=client)
+        bullet.changeDynamics(
+            solid, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=client
+        )
     x, y, yaw = (float(value) for value in start)
     cog = robot.chassis_cog
     z = cog[2] + sum(float(r.height_at(np.array([x]), np.array([y]))[0]) for r in floor.ramps)
     with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
         file = FilePath(folder) / "drive.urdf"
         file.write_text(drive_urdf(robot), encoding="utf-8")
-        body = int(bullet.loadURDF(
-            str(file), basePosition=(x + np.cos(yaw) * cog[0], y + np.sin(yaw) * cog[0], z + 1e-4),
-            baseOrientation=bullet.getQuaternionFromEuler((0.0, 0.0, yaw)),
-            flags=bullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client))
-    names = {bullet.getJointInfo(body, j, physicsClientId=client)[1].decode(): j
-             for j in range(bullet.getNumJoints(body, physicsClientId=client))}
+        body = int(
+            bullet.loadURDF(
+                str(file),
+                basePosition=(x + np.cos(yaw) * cog[0], y + np.sin(yaw) * cog[0], z + 1e-4),
+                baseOrientation=bullet.getQuaternionFromEuler((0.0, 0.0, yaw)),
+                flags=bullet.URDF_USE_INERTIA_FROM_FILE,
+                physicsClientId=client,
+            )
+        )
+    names = {
+        bullet.getJointInfo(body, j, physicsClientId=client)[1].decode(): j
+        for j in range(bullet.getNumJoints(body, physicsClientId=client))
+    }
     joints = tuple(names[n] for n in ("wheel_left", "wheel_right", "caster_left", "caster_right"))
     for link in range(-1, len(names)):
         friction = floor.friction if link in joints[:2] else 0.0
-        bullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
-        bullet.changeDynamics(body, link, jointDamping=0.0, maxJointVelocity=1e3, physicsClientId=client)
-        bullet.changeDynamics(body, link, lateralFriction=friction, spinningFriction=0.0, rollingFriction=0.0,
-                              restitution=0.0, physicsClientId=client)
-        if link in joints:  # equally stiff, so that the four contacts share the load as the limits assume
-            bullet.changeDynamics(body, link, contactStiffness=_STIFFNESS, contactDamping=_DAMPING,
-                                  physicsClientId=client)
-    return DriveSession(bullet, client, body, tuple(ground), tuple(walls), robot,
-                    (joints[0], joints[1], joints[2], joints[3]))
+        bullet.changeDynamics(
+            body, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client
+        )
+        bullet.changeDynamics(
+            body, link, jointDamping=0.0, maxJointVelocity=1e3, physicsClientId=client
+        )
+        bullet.changeDynamics(
+            body,
+            link,
+            lateralFriction=friction,
+            spinningFriction=0.0,
+            rollingFriction=0.0,
+            restitution=0.0,
+            physicsClientId=client,
+        )
+        if (
+            link in joints
+        ):  # equally stiff, so that the four contacts share the load as the limits assume
+            bullet.changeDynamics(
+                body,
+                link,
+                contactStiffness=_STIFFNESS,
+                contactDamping=_DAMPING,
+                physicsClientId=client,
+            )
+    return DriveSession(
+        bullet,
+        client,
+        body,
+        tuple(ground),
+        tuple(walls),
+        robot,
+        (joints[0], joints[1], joints[2], joints[3]),
+    )
 
 
 def _ramp(bullet: Any, client: int, ramp: Ramp) -> int:
@@ -299,12 +389,21 @@ def _ramp(bullet: Any, client: int, ramp: Ramp) -> int:
     z = ramp.height_at(x, y)
     z[0] -= 1e-3  # the foot lies under the plane
     side = _RAMP_WIDTH / 2
-    vertices = [[a - s * side * sin, b + s * side * cos, c] for a, b, c in zip(x, y, z, strict=True) for s in (1, -1)]
+    vertices = [
+        [a - s * side * sin, b + s * side * cos, c]
+        for a, b, c in zip(x, y, z, strict=True)
+        for s in (1, -1)
+    ]
     faces = []
     for i in range(len(d) - 1):
         faces += [2 * i, 2 * i + 1, 2 * i + 2, 2 * i + 1, 2 * i + 3, 2 * i + 2]
-    shape = bullet.createCollisionShape(bullet.GEOM_MESH, vertices=vertices, indices=faces,
-                                        flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH, physicsClientId=client)
+    shape = bullet.createCollisionShape(
+        bullet.GEOM_MESH,
+        vertices=vertices,
+        indices=faces,
+        flags=bullet.GEOM_FORCE_CONCAVE_TRIMESH,
+        physicsClientId=client,
+    )
     return int(bullet.createMultiBody(0.0, shape, physicsClientId=client))
 
 
@@ -312,11 +411,16 @@ def _wall(bullet: Any, client: int, wall: Wall) -> int:
     a, b = np.asarray(wall.start), np.asarray(wall.end)
     along, middle = b - a, (a + b) / 2
     shape = bullet.createCollisionShape(
-        bullet.GEOM_BOX, halfExtents=[float(np.hypot(*along)) / 2, wall.thickness / 2, _WALL_HEIGHT / 2],
-        physicsClientId=client)
+        bullet.GEOM_BOX,
+        halfExtents=[float(np.hypot(*along)) / 2, wall.thickness / 2, _WALL_HEIGHT / 2],
+        physicsClientId=client,
+    )
     turned = bullet.getQuaternionFromEuler((0.0, 0.0, float(np.arctan2(along[1], along[0]))))
-    return int(bullet.createMultiBody(0.0, shape, -1, (*middle.tolist(), _WALL_HEIGHT / 2), turned,
-                                      physicsClientId=client))
+    return int(
+        bullet.createMultiBody(
+            0.0, shape, -1, (*middle.tolist(), _WALL_HEIGHT / 2), turned, physicsClientId=client
+        )
+    )
 
 
 def _folded(angle: Any) -> Any:

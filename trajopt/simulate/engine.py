@@ -1,7 +1,7 @@
 """The contract that every physics engine fulfils.
 
-Robot frame: x forward, y left, z up, origin below the middle of the wheel centres, on the ground when the
-robot stands on flat ground. Wheel order: front-left, front-right, rear-left, rear-right.
+Robot frame: x forward, y left, z up, origin below the middle of the wheel centres, on the ground
+when the robot stands on flat ground. Wheel order: front-left, front-right, rear-left, rear-right.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ ENGINES = ("pybullet", "mujoco")
 class SimRobot:
     """A chassis box on four roller wheels, all that an engine needs to build it.
 
-    ``chassis_mass`` [kg] without wheels, ``chassis_size`` (length, width, height) [m] of the box that
-    collides with the terrain, ``chassis_clearance`` [m] from the ground to its bottom, ``cog_height`` [m]
-    of the chassis alone above the ground, ``wheel_positions`` four (x, y) [m], ``wheels`` in the same
-    order, ``torque_limit`` [N m] at each wheel, ``chassis_inertia`` principal (xx, yy, zz) [kg m^2], by
-    default that of the box.
+    ``chassis_mass`` [kg] without wheels, ``chassis_size`` (length, width, height) [m] of the box
+    that collides with the terrain, ``chassis_clearance`` [m] from the ground to its bottom,
+    ``cog_height`` [m] of the chassis alone above the ground, ``wheel_positions`` four (x, y) [m],
+    ``wheels`` in the same order, ``torque_limit`` [N m] at each wheel, ``chassis_inertia``
+    principal (xx, yy, zz) [kg m^2], by default that of the box.
     """
 
     name: str
@@ -52,11 +52,18 @@ class SimRobot:
         """Raise ArgumentError for a size, mass or torque that makes no robot."""
         for name in ("chassis_mass", "cog_height", "torque_limit"):
             require(name, getattr(self, name), low=0.0, expected="a positive number")
-        require("chassis_clearance", self.chassis_clearance, low=-1e-12, expected="a height of at least 0 m")
+        require(
+            "chassis_clearance",
+            self.chassis_clearance,
+            low=-1e-12,
+            expected="a height of at least 0 m",
+        )
         for size in self.chassis_size:
             require("chassis_size", size, low=0.0, expected="three positive lengths in m")
         if len(self.wheels) != 4 or len(self.wheel_positions) != 4:
-            raise ArgumentError("wheels", len(self.wheels), "4 wheels and 4 wheel positions (FL, FR, RL, RR)")
+            raise ArgumentError(
+                "wheels", len(self.wheels), "4 wheels and 4 wheel positions (FL, FR, RL, RR)"
+            )
 
     @property
     def inertia(self) -> Vector:
@@ -69,32 +76,49 @@ class SimRobot:
 
     def wheel_centres(self) -> FloatArray:
         """Wheel centres (4, 3) in the robot frame [m]."""
-        return np.array([(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)])
+        return np.array(
+            [(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)]
+        )
 
     @cached_property
     def platform(self) -> Platform:
         """The same robot as wheels on a body: its kinematics, and the data that limits need.
 
-        Swedish wheels, each with the roller that touches flat ground; the footprint is the box around
-        chassis and wheels.
+        Swedish wheels, each with the roller that touches flat ground; the footprint is the box
+        around chassis and wheels.
         """
         masses = np.array([wheel.mass for wheel in self.wheels])
         places = self.wheel_centres()
         mass = self.chassis_mass + float(masses.sum())
-        x, y, height = (masses @ places + self.chassis_mass * np.array([0.0, 0.0, self.cog_height])) / mass
-        # wheels as points: their own inertia about the vertical is about 1 % of what their places give
+        x, y, height = (
+            masses @ places + self.chassis_mass * np.array([0.0, 0.0, self.cog_height])
+        ) / mass
+        # wheels as points: their own inertia about the vertical is about 1 % of what their places
+        # give
         yaw_inertia = self.inertia[2] + float(masses @ np.sum(places[:, :2] ** 2, axis=1))
         angles = tuple(wheel.angle for wheel in self.wheels)
-        body = Body(mass, yaw_inertia, (float(x), float(y), float(height)), self.wheel_positions, angles, (True,) * 4)
+        body = Body(
+            mass,
+            yaw_inertia,
+            (float(x), float(y), float(height)),
+            self.wheel_positions,
+            angles,
+            (True,) * 4,
+        )
         reach = [self.chassis_size[0] / 2.0, self.chassis_size[1] / 2.0]
         for (px, py), wheel in zip(self.wheel_positions, self.wheels, strict=True):
-            reach = [max(reach[0], abs(px) + wheel.radius), max(reach[1], abs(py) + wheel.width / 2.0)]
+            reach = [
+                max(reach[0], abs(px) + wheel.radius),
+                max(reach[1], abs(py) + wheel.width / 2.0),
+            ]
         ex, ey = reach
         wheels = tuple(
             swedish_wheel(px, py, wheel.radius, wheel.angle)
             for (px, py), wheel in zip(self.wheel_positions, self.wheels, strict=True)
         )
-        return Platform(self.name, wheels, body, ((ex, ey), (-ex, ey), (-ex, -ey), (ex, -ey)), holonomic=True)
+        return Platform(
+            self.name, wheels, body, ((ex, ey), (-ex, ey), (-ex, -ey), (ex, -ey)), holonomic=True
+        )
 
     def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> FloatArray:
         """Wheel speeds (4,) [rad/s] that roll without slip at body speeds (m/s, m/s, rad/s)."""
@@ -106,8 +130,8 @@ class SimRobot:
 class Command:
     """Wheel speeds over time, linear between samples, zero before and after.
 
-    ``times`` (N,) [s] from 0, rising; ``wheel_speeds`` (N, 4) [rad/s]; ``start_pose`` (x, y, yaw) [m, m,
-    rad]; ``start_wheel_angles`` (4,) [rad].
+    ``times`` (N,) [s] from 0, rising; ``wheel_speeds`` (N, 4) [rad/s]; ``start_pose`` (x, y, yaw)
+    [m, m, rad]; ``start_wheel_angles`` (4,) [rad].
     """
 
     times: FloatArray
@@ -116,7 +140,8 @@ class Command:
     start_wheel_angles: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Raise ArgumentError for wrong shapes, times that do not rise from 0, or values not finite."""
+        """Raise ArgumentError for wrong shapes, times that do not rise from 0, or values not
+        finite."""
         times, speeds = np.asarray(self.times), np.asarray(self.wheel_speeds)
         if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not np.all(np.diff(times) > 0.0):
             raise ArgumentError("times", times, "at least two rising times in s, the first 0")
@@ -140,10 +165,14 @@ class Command:
         """Wheel speeds (4,) at ``moment`` [s]."""
         if moment < 0.0 or moment > self.times[-1]:
             return np.zeros(4)
-        right = int(np.clip(np.searchsorted(self.times, moment, side="right"), 1, len(self.times) - 1))
+        right = int(
+            np.clip(np.searchsorted(self.times, moment, side="right"), 1, len(self.times) - 1)
+        )
         before, after = self.times[right - 1], self.times[right]
         part = (moment - before) / (after - before)
-        speeds: FloatArray = (1.0 - part) * self.wheel_speeds[right - 1] + part * self.wheel_speeds[right]
+        speeds: FloatArray = (1.0 - part) * self.wheel_speeds[right - 1] + part * self.wheel_speeds[
+            right
+        ]
         return speeds
 
 
@@ -151,8 +180,8 @@ class Command:
 class Camera:
     """View for a picture at the end of a run: the camera looks at the robot (or ``target``, m).
 
-    ``distance`` [m], ``yaw`` and ``pitch`` [rad] (yaw 0 looks along +y, negative pitch looks down), size in
-    pixels.
+    ``distance`` [m], ``yaw`` and ``pitch`` [rad] (yaw 0 looks along +y, negative pitch looks down),
+    size in pixels.
     """
 
     width: int = 640
@@ -186,12 +215,12 @@ class Observation:
 class Recording:
     """What happened, from the start of the command (after settling).
 
-    ``times`` (N,) [s]; ``pose`` (N, 3) x, y [m] and yaw [rad], counted on; ``height`` [m], ``roll``,
-    ``pitch`` [rad] (N,) of the robot frame; ``wheel_angles`` [rad], counted on, ``wheel_speeds`` [rad/s],
-    ``wheel_torques`` [N m] and ``wheel_heights`` [m] of the wheel centres, all (N, 4); ``contacts`` (N,).
-    ``exploded`` with its ``reason`` when the run was stopped because the numbers left physics.
-    ``wall_time`` [s] of stepping, ``real_time_factor`` simulated over wall time [-], ``picture`` (H, W, 3)
-    uint8 when asked.
+    ``times`` (N,) [s]; ``pose`` (N, 3) x, y [m] and yaw [rad], counted on; ``height`` [m],
+    ``roll``, ``pitch`` [rad] (N,) of the robot frame; ``wheel_angles`` [rad], counted on,
+    ``wheel_speeds`` [rad/s], ``wheel_torques`` [N m] and ``wheel_heights`` [m] of the wheel
+    centres, all (N, 4); ``contacts`` (N,). ``exploded`` with its ``reason`` when the run was
+    stopped because the numbers left physics. ``wall_time`` [s] of stepping, ``real_time_factor``
+    simulated over wall time [-], ``picture`` (H, W, 3) uint8 when asked.
     """
 
     engine: str
@@ -255,7 +284,8 @@ class Session(Protocol):
 
 
 def make_engine(name: str) -> Engine:
-    """The engine called ``name`` (one of ENGINES) with its default options; its package loads on first run.
+    """The engine called ``name`` (one of ENGINES) with its default options; its package loads on
+    first run.
 
     Raises ArgumentError for an unknown name.
     """

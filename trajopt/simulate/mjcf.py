@@ -24,7 +24,10 @@ from trajopt.simulate.scene import Block, Scene, blocks
 ROBOT_BITS = 'contype="1" conaffinity="2"'
 TERRAIN_BITS = 'contype="2" conaffinity="1"'
 UNSEEN_BITS = 'contype="0" conaffinity="0" mass="0"'
-ROLLER_COLOURS = ("0.15 0.15 0.15 1", "0.85 0.45 0.1 1")  # every other roller: turning shows in pictures
+ROLLER_COLOURS = (
+    "0.15 0.15 0.15 1",
+    "0.85 0.45 0.1 1",
+)  # every other roller: turning shows in pictures
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,8 @@ class Solver:
 
 
 def scene_mjcf(robot: SimRobot, scene: Scene, solver: Solver, camera: Camera | None) -> str:
-    """MJCF of robot and terrain: a free base, wheel joints ``wheel_0`` to ``wheel_3``, actuators likewise."""
+    """MJCF of robot and terrain: a free base, wheel joints ``wheel_0`` to ``wheel_3``, actuators
+    likewise."""
     names = _mesh_names(robot)
     meshes = "".join(_mesh(profile, name) for profile, name in names.items())
     size = (camera.width, camera.height) if camera is not None else (64, 64)
@@ -86,7 +90,9 @@ def _wheel(robot: SimRobot, index: int, names: dict[Revolved, str]) -> str:
     about, across = disc_inertia(wheel.hub_mass, 0.8 * wheel.radius, wheel.width)
     drum = hub_drum(wheel)
     disc = f'type="cylinder" size="{drum.radii[0]!r} {drum.stations[1]!r}" euler="1.5707963 0 0"'
-    rollers = "".join(_roller(number, wheel, roller, names) for number, roller in enumerate(wheel.rollers))
+    rollers = "".join(
+        _roller(number, wheel, roller, names) for number, roller in enumerate(wheel.rollers)
+    )
     return (
         f'<body name="hub_{index}" pos="{_numbers((x, y, wheel.radius))}">'
         f'<joint name="wheel_{index}" type="hinge" axis="0 1 0"/>'
@@ -112,9 +118,13 @@ def _shapes(roller: Roller, names: dict[Revolved, str]) -> list[str]:
     profile = roller.profile
     if isinstance(profile, SphereChain):
         pairs = zip(profile.stations, profile.radii, strict=True)
-        return [f'type="sphere" size="{radius!r}" pos="0 0 {station!r}"' for station, radius in pairs]
+        return [
+            f'type="sphere" size="{radius!r}" pos="0 0 {station!r}"' for station, radius in pairs
+        ]
     if isinstance(profile, Ellipsoid):
-        return [f'type="ellipsoid" size="{_numbers((profile.radius, profile.radius, profile.half_length))}"']
+        return [
+            f'type="ellipsoid" size="{_numbers((profile.radius, profile.radius, profile.half_length))}"'
+        ]
     if is_cylinder(profile):
         low, high = profile.stations
         size = _numbers((profile.radii[0], (high - low) / 2.0))

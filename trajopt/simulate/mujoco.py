@@ -40,7 +40,9 @@ class MuJoCo:
         """Raise ArgumentError for options that MuJoCo cannot use."""
         Pace(self.step, self.stride)
         if not self.contact_time >= 2.0 * self.step:
-            raise ArgumentError("contact_time", self.contact_time, f"at least two steps = {2 * self.step:g} s")
+            raise ArgumentError(
+                "contact_time", self.contact_time, f"at least two steps = {2 * self.step:g} s"
+            )
         for name in ("contact_damping", "wheel_gain", "iterations"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ArgumentError(name, getattr(self, name), "a positive number")
@@ -62,15 +64,19 @@ class MuJoCo:
     ) -> Recording:
         """Drive ``robot`` through ``scene``; arguments and errors of ``stepping.drive``.
 
-        Also raises MissingDependencyError without mujoco, and SimulationError when MuJoCo cannot build
-        the model or has no graphics for a picture.
+        Also raises MissingDependencyError without mujoco, and SimulationError when MuJoCo cannot
+        build the model or has no graphics for a picture.
         """
         mujoco = load_mujoco()
-        solver = Solver(self.step, self.contact_time, self.contact_damping, self.wheel_gain, self.iterations)
+        solver = Solver(
+            self.step, self.contact_time, self.contact_damping, self.wheel_gain, self.iterations
+        )
         try:
             model = mujoco.MjModel.from_xml_string(scene_mjcf(robot, scene, solver, picture))
         except ValueError as error:
-            raise SimulationError(f"mujoco could not build the robot {robot.name!r}: {error}") from error
+            raise SimulationError(
+                f"mujoco could not build the robot {robot.name!r}: {error}"
+            ) from error
         return drive(
             _session(mujoco, model, command),
             robot,
@@ -126,7 +132,8 @@ class _MuJoCoSession:
         )
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
-        """Picture (H, W, 3) by MuJoCo's OpenGL renderer. Raises SimulationError without graphics."""
+        """Picture (H, W, 3) by MuJoCo's OpenGL renderer. Raises SimulationError without
+        graphics."""
         place = self.data.qpos[:3]
         view = self.mujoco.MjvCamera()
         view.lookat[:] = camera.target if camera.target is not None else (place[0], place[1], 0.08)
@@ -137,7 +144,9 @@ class _MuJoCoSession:
             renderer = self.mujoco.Renderer(self.model, camera.height, camera.width)
         except Exception as error:  # the OpenGL back ends raise what they like
             advice = "set MUJOCO_GL=egl or osmesa, or take the picture with pybullet"
-            raise SimulationError(f"mujoco found no graphics for a picture ({error}): {advice}") from error
+            raise SimulationError(
+                f"mujoco found no graphics for a picture ({error}): {advice}"
+            ) from error
         try:
             renderer.update_scene(self.data, view)
             image: NDArray[np.uint8] = renderer.render().copy()
@@ -149,7 +158,9 @@ class _MuJoCoSession:
 def _session(mujoco: Any, model: Any, command: Command) -> _MuJoCoSession:
     data = mujoco.MjData(model)
     x, y, yaw = command.start_pose
-    joints = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"wheel_{index}") for index in range(4)]
+    joints = [
+        mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, f"wheel_{index}") for index in range(4)
+    ]
     positions = np.array([model.jnt_qposadr[joint] for joint in joints], dtype=np.intp)
     velocities = np.array([model.jnt_dofadr[joint] for joint in joints], dtype=np.intp)
     start = np.array(command.start_wheel_angles, dtype=np.float64)

@@ -1,8 +1,8 @@
 """PowerBot as a physics engine builds it: two driven wheels and two free casters.
 
-Wheels touch the floor with one point each (spheres as collision shapes), as the limits assume. Casters are
-balls without friction: they carry load and nothing else, which is what thesis 004 assumes of free-rolling
-casters; their swivel is left out.
+Wheels touch the floor with one point each (spheres as collision shapes), as the limits assume.
+Casters are balls without friction: they carry load and nothing else, which is what thesis 004
+assumes of free-rolling casters; their swivel is left out.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ CHASSIS_CLEARANCE = 0.10  # m, chosen
 
 @dataclass(frozen=True)
 class DriveRobot:
-    """What the engine needs of a differential drive with two casters behind; SI units, body frame."""
+    """What the engine needs of a differential drive with two casters behind; SI units, body
+    frame."""
 
     platform: Platform
     torque_limit: float = TORQUE_LIMIT
@@ -35,7 +36,9 @@ class DriveRobot:
         if len(self.platform.wheels) != 2 or len(self.platform.body.contacts) != 4:
             raise ArgumentError("platform", self.platform.name, "two driven wheels and two casters")
         if not self.chassis_mass > 0:
-            raise ArgumentError("wheel_mass", self.wheel_mass, "wheels and casters lighter than the robot")
+            raise ArgumentError(
+                "wheel_mass", self.wheel_mass, "wheels and casters lighter than the robot"
+            )
 
     @property
     def chassis_mass(self) -> float:
@@ -48,8 +51,11 @@ class DriveRobot:
         body, m = self.platform.body, self.chassis_mass
         casters = body.contacts[2][0]
         x = (body.mass * body.cog[0] - 2 * self.caster_mass * casters) / m
-        z = (body.mass * body.cog[2] - 2 * self.wheel_mass * self.radius
-             - 2 * self.caster_mass * CASTER_RADIUS) / m
+        z = (
+            body.mass * body.cog[2]
+            - 2 * self.wheel_mass * self.radius
+            - 2 * self.caster_mass * CASTER_RADIUS
+        ) / m
         return x, 0.0, z
 
     @property
@@ -64,7 +70,8 @@ def powerbot_drive(platform: Platform | None = None) -> DriveRobot:
 
 
 def drive_urdf(robot: DriveRobot) -> str:
-    """URDF whose base frame is the chassis' centre of gravity; joints wheel_left, wheel_right, caster_*."""
+    """URDF whose base frame is the chassis' centre of gravity; joints wheel_left, wheel_right,
+    caster_*."""
     cog, body = robot.chassis_cog, robot.platform.body
     xs = [corner[0] for corner in robot.platform.footprint]
     ys = [corner[1] for corner in robot.platform.footprint]
@@ -72,11 +79,17 @@ def drive_urdf(robot: DriveRobot) -> str:
     yaw = max(body.yaw_inertia - 2 * robot.wheel_mass * body.contacts[0][1] ** 2, 1.0)
     pitch = robot.chassis_mass * (length**2 + CHASSIS_HEIGHT**2) / 12
     roll = robot.chassis_mass * (width**2 + CHASSIS_HEIGHT**2) / 12
-    middle = ((max(xs) + min(xs)) / 2 - cog[0], 0.0, CHASSIS_CLEARANCE + CHASSIS_HEIGHT / 2 - cog[2])
+    middle = (
+        (max(xs) + min(xs)) / 2 - cog[0],
+        0.0,
+        CHASSIS_CLEARANCE + CHASSIS_HEIGHT / 2 - cog[2],
+    )
     box = f'<origin xyz="{_text(middle)}"/><geometry><box size="{length} {width} {CHASSIS_HEIGHT}"/></geometry>'
-    parts = ['<?xml version="1.0"?>\n<robot name="drive">\n',
-             f'<link name="chassis">{_inertial(robot.chassis_mass, (roll, pitch, yaw))}'
-             f"<collision>{box}</collision><visual>{box}</visual></link>\n"]
+    parts = [
+        '<?xml version="1.0"?>\n<robot name="drive">\n',
+        f'<link name="chassis">{_inertial(robot.chassis_mass, (roll, pitch, yaw))}'
+        f"<collision>{box}</collision><visual>{box}</visual></link>\n",
+    ]
     spin = robot.wheel_mass * WHEEL_RADIUS**2 / 2
     across = robot.wheel_mass * (3 * WHEEL_RADIUS**2 + WHEEL_WIDTH**2) / 12
     names = ("wheel_left", "wheel_right", "caster_left", "caster_right")
@@ -87,20 +100,32 @@ def drive_urdf(robot: DriveRobot) -> str:
         moments = (across, spin, across) if wheel else (0.4 * mass * radius**2,) * 3
         place = (x - cog[0], y - cog[1], radius - cog[2])
         shape = f'<geometry><sphere radius="{radius}"/></geometry>'
-        seen = (f'<origin rpy="{math.pi / 2} 0 0"/><geometry><cylinder radius="{radius}" length="{WHEEL_WIDTH}"/>'
-                "</geometry>") if wheel else shape
-        parts.append(f'<link name="{name}_link">{_inertial(mass, moments)}<collision>{shape}</collision>'
-                     f"<visual>{seen}</visual></link>\n")
+        seen = (
+            (
+                f'<origin rpy="{math.pi / 2} 0 0"/><geometry><cylinder radius="{radius}" length="{WHEEL_WIDTH}"/>'
+                "</geometry>"
+            )
+            if wheel
+            else shape
+        )
+        parts.append(
+            f'<link name="{name}_link">{_inertial(mass, moments)}<collision>{shape}</collision>'
+            f"<visual>{seen}</visual></link>\n"
+        )
         kind = "continuous" if wheel else "fixed"
-        parts.append(f'<joint name="{name}" type="{kind}"><parent link="chassis"/><child link="{name}_link"/>'
-                     f'<origin xyz="{_text(place)}"/><axis xyz="0 1 0"/></joint>\n')
+        parts.append(
+            f'<joint name="{name}" type="{kind}"><parent link="chassis"/><child link="{name}_link"/>'
+            f'<origin xyz="{_text(place)}"/><axis xyz="0 1 0"/></joint>\n'
+        )
     return "".join([*parts, "</robot>\n"])
 
 
 def _inertial(mass: float, moments: tuple[float, float, float]) -> str:
     x, y, z = moments
-    return (f'<inertial><mass value="{mass}"/><inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/>'
-            "</inertial>")
+    return (
+        f'<inertial><mass value="{mass}"/><inertia ixx="{x}" iyy="{y}" izz="{z}" ixy="0" ixz="0" iyz="0"/>'
+        "</inertial>"
+    )
 
 
 def _text(values: tuple[float, float, float]) -> str:

@@ -1,7 +1,7 @@
 """Bullet through pybullet, in a private client for each run.
 
-The robot is a URDF written for this run: base at the chassis' centre of gravity, one continuous joint a
-wheel, one a roller. Why the settings are what they are stands beside each option.
+The robot is a URDF written for this run: base at the chassis' centre of gravity, one continuous
+joint a wheel, one a roller. Why the settings are what they are stands beside each option.
 """
 
 from __future__ import annotations
@@ -34,12 +34,13 @@ from trajopt.simulate.scene import Scene, blocks
 from trajopt.simulate.stepping import Pace, drive
 from trajopt.simulate.urdf import robot_urdf
 
-# Joints that one Bullet multibody can report; with more, joint states silently read zero (measured).
+# Joints that one Bullet multibody can report; with more, joint states silently read zero
+# (measured).
 MAX_JOINTS = 121
 # Collision filter groups (bits): the robot's parts meet the terrain and never each other.
 ROBOT_GROUP, TERRAIN_GROUP = 2, 1
-# Bullet stops joints at 100 rad/s unless told otherwise; a roller of 9.5 mm turns at 124 rad/s in lateral
-# motion at 3 km/h [rad/s].
+# Bullet stops joints at 100 rad/s unless told otherwise; a roller of 9.5 mm turns at 124 rad/s in
+# lateral motion at 3 km/h [rad/s].
 MAX_JOINT_SPEED = 1e4
 # Rounded margin that Bullet adds around convex hulls of a URDF [m] (gUrdfDefaultCollisionMargin).
 HULL_MARGIN = 0.001
@@ -52,7 +53,9 @@ class PyBullet:
     step: float = 0.002  # s; at 10 ms the robot drifts by 5-13 %
     stride: int = 5  # steps between two records; 10 ms, the thesis's step
     solver_iterations: int = 50  # Bullet's default
-    contact_breaking_threshold: float = 0.001  # m; the default 20 mm keeps contacts of rollers in the air
+    contact_breaking_threshold: float = (
+        0.001  # m; the default 20 mm keeps contacts of rollers in the air
+    )
     contact_erp: float = 0.2  # share of a penetration removed a step; Bullet's default
     wheel_gain: float = 1.0  # share of the wheel speed error removed a step; Bullet's default
 
@@ -62,7 +65,9 @@ class PyBullet:
         if self.solver_iterations < 1:
             raise ArgumentError("solver_iterations", self.solver_iterations, "at least 1 iteration")
         if not self.contact_breaking_threshold > 0.0:
-            raise ArgumentError("contact_breaking_threshold", self.contact_breaking_threshold, "a length in m")
+            raise ArgumentError(
+                "contact_breaking_threshold", self.contact_breaking_threshold, "a length in m"
+            )
         for name in ("contact_erp", "wheel_gain"):
             if not 0.0 < getattr(self, name) <= 1.0:
                 raise ArgumentError(name, getattr(self, name), "a share in (0, 1]")
@@ -100,7 +105,9 @@ class PyBullet:
         if client < 0:
             raise SimulationError("pybullet could not open another physics client in this process")
         try:
-            session = _session(self, bullet, client, robot, scene, command, visible=picture is not None)
+            session = _session(
+                self, bullet, client, robot, scene, command, visible=picture is not None
+            )
             return drive(
                 session,
                 robot,
@@ -128,7 +135,9 @@ def load_bullet() -> Any:
     try:
         import pybullet
     except ImportError as error:
-        raise MissingDependencyError("pybullet", "simulate", "the physics engine 'pybullet'") from error
+        raise MissingDependencyError(
+            "pybullet", "simulate", "the physics engine 'pybullet'"
+        ) from error
     finally:
         os.dup2(kept, 2)
         os.close(kept)
@@ -164,11 +173,15 @@ class _BulletSession:
 
     def observe(self) -> Observation:
         """State now."""
-        where, attitude = self.bullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        where, attitude = self.bullet.getBasePositionAndOrientation(
+            self.body, physicsClientId=self.client
+        )
         linear, angular = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
         rotation = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
         arm = rotation @ self.cog
-        joints = self.bullet.getJointStates(self.body, self.wheel_joints, physicsClientId=self.client)
+        joints = self.bullet.getJointStates(
+            self.body, self.wheel_joints, physicsClientId=self.client
+        )
         contacts = self.bullet.getContactPoints(bodyA=self.body, physicsClientId=self.client)
         touching = [point[8] for point in contacts if point[9] > 0.0]  # those that carry a force
         return Observation(
@@ -185,11 +198,15 @@ class _BulletSession:
     def render(self, camera: Camera) -> NDArray[np.uint8]:
         """Picture (H, W, 3) by Bullet's own software renderer."""
         seen = self.observe().position
-        target = camera.target if camera.target is not None else (float(seen[0]), float(seen[1]), 0.08)
+        target = (
+            camera.target if camera.target is not None else (float(seen[0]), float(seen[1]), 0.08)
+        )
         view = self.bullet.computeViewMatrixFromYawPitchRoll(
             target, camera.distance, math.degrees(camera.yaw), math.degrees(camera.pitch), 0.0, 2
         )
-        lens = self.bullet.computeProjectionMatrixFOV(45.0, camera.width / camera.height, 0.05, 20.0)
+        lens = self.bullet.computeProjectionMatrixFOV(
+            45.0, camera.width / camera.height, 0.05, 20.0
+        )
         shot = self.bullet.getCameraImage(
             camera.width,
             camera.height,
@@ -200,7 +217,9 @@ class _BulletSession:
             renderer=self.bullet.ER_TINY_RENDERER,
             physicsClientId=self.client,
         )
-        image: NDArray[np.uint8] = np.array(shot[2], dtype=np.uint8).reshape(camera.height, camera.width, 4)
+        image: NDArray[np.uint8] = np.array(shot[2], dtype=np.uint8).reshape(
+            camera.height, camera.width, 4
+        )
         return image[:, :, :3].copy()
 
 
@@ -227,16 +246,27 @@ def _session(
         physicsClientId=client,
     )
     for ground in _terrain(bullet, client, scene, visible=visible):
-        _surface(bullet, client, ground, -1, friction=1.0)  # Bullet multiplies: the rollers carry it all
-        bullet.setCollisionFilterGroupMask(ground, -1, TERRAIN_GROUP, ROBOT_GROUP, physicsClientId=client)
+        _surface(
+            bullet, client, ground, -1, friction=1.0
+        )  # Bullet multiplies: the rollers carry it all
+        bullet.setCollisionFilterGroupMask(
+            ground, -1, TERRAIN_GROUP, ROBOT_GROUP, physicsClientId=client
+        )
     body = _load(bullet, client, robot, command, visible=visible)
     count = bullet.getNumJoints(body, physicsClientId=client)
-    names = [bullet.getJointInfo(body, joint, physicsClientId=client)[1].decode() for joint in range(count)]
+    names = [
+        bullet.getJointInfo(body, joint, physicsClientId=client)[1].decode()
+        for joint in range(count)
+    ]
     if count != 4 + sum(len(wheel.rollers) for wheel in robot.wheels):
-        raise SimulationError(f"pybullet built {count} joints, not those of the robot {robot.name!r}")
+        raise SimulationError(
+            f"pybullet built {count} joints, not those of the robot {robot.name!r}"
+        )
     for joint in range(-1, count):
         _surface(bullet, client, body, joint, friction=scene.friction)
-        bullet.setCollisionFilterGroupMask(body, joint, ROBOT_GROUP, TERRAIN_GROUP, physicsClientId=client)
+        bullet.setCollisionFilterGroupMask(
+            body, joint, ROBOT_GROUP, TERRAIN_GROUP, physicsClientId=client
+        )
     rollers = [joint for joint, name in enumerate(names) if "roller" in name]
     # every joint is born with a motor that brakes it
     bullet.setJointMotorControlArray(
@@ -248,7 +278,9 @@ def _session(
     for joint, angle in zip(wheels, folded, strict=True):
         bullet.resetJointState(body, joint, float(angle), 0.0, physicsClientId=client)
     cog = np.array([0.0, 0.0, robot.cog_height])
-    return _BulletSession(bullet, client, body, wheels, robot.torque_limit, options.wheel_gain, cog, start - folded)
+    return _BulletSession(
+        bullet, client, body, wheels, robot.torque_limit, options.wheel_gain, cog, start - folded
+    )
 
 
 def _terrain(bullet: Any, client: int, scene: Scene, *, visible: bool) -> Iterator[int]:
@@ -256,21 +288,29 @@ def _terrain(bullet: Any, client: int, scene: Scene, *, visible: bool) -> Iterat
     yield bullet.createMultiBody(0.0, plane, physicsClientId=client)
     for block in blocks(scene.terrain):
         half = [extent / 2.0 for extent in block.size]
-        shape = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=half, physicsClientId=client)
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_BOX, halfExtents=half, physicsClientId=client
+        )
         colour = [0.75, 0.62, 0.42, 1.0]
         seen = (
-            bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client)
+            bullet.createVisualShape(
+                bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client
+            )
             if visible
             else -1
         )
-        yield bullet.createMultiBody(0.0, shape, seen, block.centre, block.quaternion(), physicsClientId=client)
+        yield bullet.createMultiBody(
+            0.0, shape, seen, block.centre, block.quaternion(), physicsClientId=client
+        )
 
 
 def _load(bullet: Any, client: int, robot: SimRobot, command: Command, *, visible: bool) -> int:
     x, y, yaw = command.start_pose
     with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
         path = Path(folder) / "robot.urdf"
-        path.write_text(robot_urdf(robot, Path(folder), margin=HULL_MARGIN, visible=visible), encoding="utf-8")
+        path.write_text(
+            robot_urdf(robot, Path(folder), margin=HULL_MARGIN, visible=visible), encoding="utf-8"
+        )
         try:
             return int(
                 bullet.loadURDF(
@@ -282,7 +322,9 @@ def _load(bullet: Any, client: int, robot: SimRobot, command: Command, *, visibl
                 )
             )
         except bullet.error as error:
-            raise SimulationError(f"pybullet could not build the robot {robot.name!r}: {error}") from error
+            raise SimulationError(
+                f"pybullet could not build the robot {robot.name!r}: {error}"
+            ) from error
 
 
 def _surface(bullet: Any, client: int, body: int, link: int, *, friction: float) -> None:
@@ -291,7 +333,9 @@ def _surface(bullet: Any, client: int, body: int, link: int, *, friction: float)
     Joint speed or damping in the same call as friction makes Bullet drop the friction.
     """
     bullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
-    bullet.changeDynamics(body, link, jointDamping=0.0, maxJointVelocity=MAX_JOINT_SPEED, physicsClientId=client)
+    bullet.changeDynamics(
+        body, link, jointDamping=0.0, maxJointVelocity=MAX_JOINT_SPEED, physicsClientId=client
+    )
     bullet.changeDynamics(
         body,
         link,

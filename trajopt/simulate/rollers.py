@@ -1,15 +1,15 @@
 """Wheels as lists of rollers: pure geometry that every physics engine builds from.
 
-Wheel frame: origin at the wheel centre, x forward, y along the axle to the left, z up, wheel angle 0.
-A positive wheel angle turns about +y (the top moves forward, the wheel drives forward).
-A place on the rim is named by its normal angle ``phi``: the outward normal is
-``m(phi) = (-sin phi, 0, -cos phi)``, so ``phi = 0`` is the ground contact of a wheel at angle 0, and the
-place ``phi`` reaches the ground when the wheel has turned by ``-phi``.
+Wheel frame: origin at the wheel centre, x forward, y along the axle to the left, z up, wheel angle
+0. A positive wheel angle turns about +y (the top moves forward, the wheel drives forward). A place
+on the rim is named by its normal angle ``phi``: the outward normal is ``m(phi) = (-sin phi, 0, -cos
+phi)``, so ``phi = 0`` is the ground contact of a wheel at angle 0, and the place ``phi`` reaches
+the ground when the wheel has turned by ``-phi``.
 
 The envelope of the rollers must be the rim outline, whose support function (distance of the tangent
-line from the axle) is ``h(phi)``. A sphere centred at ``p = c + s a`` on a roller's axis touches the
-outline from inside exactly when its radius is ``min over phi of [h(phi) - p . m(phi)]``; the union of
-these spheres is the exact barrel.
+line from the axle) is ``h(phi)``. A sphere centred at ``p = c + s a`` on a roller's axis touches
+the outline from inside exactly when its radius is ``min over phi of [h(phi) - p . m(phi)]``; the
+union of these spheres is the exact barrel.
 """
 
 from __future__ import annotations
@@ -30,16 +30,17 @@ Support = Callable[[FloatArray], FloatArray]
 Shape = Literal["spheres", "barrel", "ellipsoid", "cylinder", "cone"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 
-# Normal angles on which the inscribed radius is minimised before a parabola refines it [-] (chosen: the
-# error is below 1e-8 m for a wheel of 0.1 m).
+# Normal angles on which the inscribed radius is minimised before a parabola refines it [-] (chosen:
+# the error is below 1e-8 m for a wheel of 0.1 m).
 ENVELOPE_SAMPLES = 1440
-# Places on a roller's axis, and their reach either way [m], among which its stations are interpolated
-# (chosen: 1 mm apart; the reach exceeds half of any usual roller of a wheel below 0.25 m radius).
+# Places on a roller's axis, and their reach either way [m], among which its stations are
+# interpolated (chosen: 1 mm apart; the reach exceeds half of any usual roller of a wheel below 0.25
+# m radius).
 AXIS_SAMPLES, AXIS_REACH = 241, 0.12
 # Points along the axis of a barrel's profile [-] (chosen: sagitta below 0.01 mm on a 40 mm roller).
 BARREL_STATIONS = 13
-# Corners around a solid of revolution [-]. Measured on the LOC8 over 5 m lateral: 24 corners lose 3-12 %,
-# 48 lose 1.5-8 %, 96 lose 1-4 % (Bullet the lower, MuJoCo the upper end).
+# Corners around a solid of revolution [-]. Measured on the LOC8 over 5 m lateral: 24 corners lose
+# 3-12 %, 48 lose 1.5-8 %, 96 lose 1-4 % (Bullet the lower, MuJoCo the upper end).
 SIDES = 96
 # Ratio of the two end radii of a truncated-cone roller [-] (chosen; the thesis prints no sizes).
 CONE_RATIO = 0.6
@@ -57,7 +58,8 @@ class SphereChain:
 
 @dataclass(frozen=True)
 class Revolved:
-    """A convex solid of revolution: ``radii`` [m] at ``stations`` [m], straight lines in between."""
+    """A convex solid of revolution: ``radii`` [m] at ``stations`` [m], straight lines in
+    between."""
 
     stations: tuple[float, ...]
     radii: tuple[float, ...]
@@ -65,7 +67,8 @@ class Revolved:
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """An ellipsoid of revolution with equatorial ``radius`` and ``half_length`` along the axis [m]."""
+    """An ellipsoid of revolution with equatorial ``radius`` and ``half_length`` along the axis
+    [m]."""
 
     radius: float
     half_length: float
@@ -93,8 +96,8 @@ class RollerWheel:
     """A wheel made of passive rollers on a hub.
 
     ``radius`` [m] is the rolling radius on flat ground, ``width`` [m] the extent along the axle,
-    ``angle`` [rad] the direction of the roller axis that touches the ground, measured from x towards y.
-    ``hub_mass`` [kg] excludes the rollers, ``roller_mass`` [kg] is that of one roller.
+    ``angle`` [rad] the direction of the roller axis that touches the ground, measured from x
+    towards y. ``hub_mass`` [kg] excludes the rollers, ``roller_mass`` [kg] is that of one roller.
     """
 
     radius: float
@@ -116,17 +119,21 @@ def normals(phi: FloatArray) -> FloatArray:
 
 
 def tangents(phi: FloatArray) -> FloatArray:
-    """Rim tangents, the forward direction of the hub frame turned to ``phi``, shape ``(..., 3)``."""
+    """Rim tangents, the forward direction of the hub frame turned to ``phi``, shape ``(...,
+    3)``."""
     return np.stack([np.cos(phi), np.zeros_like(phi), -np.sin(phi)], axis=-1)
 
 
 def inscribed(points: FloatArray, support: Support) -> tuple[FloatArray, FloatArray]:
-    """Largest spheres at ``points`` (K, 3) inside the outline: radii (K,) and normal angles touched (K,).
+    """Largest spheres at ``points`` (K, 3) inside the outline: radii (K,) and normal angles touched
+    (K,).
 
     Minimum of ``h(phi) - p . m(phi)`` on a grid, refined by the parabola through its neighbours.
     """
     phi = np.linspace(-math.pi, math.pi, ENVELOPE_SAMPLES, endpoint=False)
-    rim = normals(phi)  # without a y component; products by hand are faster here than a matrix product
+    rim = normals(
+        phi
+    )  # without a y component; products by hand are faster here than a matrix product
     gaps = support(phi) - points[:, :1] * rim[:, 0] - points[:, 2:] * rim[:, 2]
     rows = np.arange(len(points))
     nearest = np.argmin(gaps, axis=1)
@@ -152,11 +159,12 @@ def outline_point(phi: float, support: Support) -> FloatArray:
 
 @dataclass(frozen=True)
 class Seat:
-    """Where one roller sits: it touches the outline at the normal angle ``phi`` and serves ``sector``.
+    """Where one roller sits: it touches the outline at the normal angle ``phi`` and serves
+    ``sector``.
 
     ``sector`` (low, high) holds normal angles [rad], ``radius`` [m] the roller radius at ``phi``,
-    ``angle`` [rad] the inclination of the axis to the direction of travel, ``offset`` [m] the place of
-    the roller's centre along the axle.
+    ``angle`` [rad] the inclination of the axis to the direction of travel, ``offset`` [m] the place
+    of the roller's centre along the axle.
     """
 
     phi: float
@@ -166,11 +174,13 @@ class Seat:
     offset: float = 0.0
 
 
-def place_roller(seat: Seat, support: Support, *, shape: Shape = "spheres", spheres: int = 7) -> Roller:
+def place_roller(
+    seat: Seat, support: Support, *, shape: Shape = "spheres", spheres: int = 7
+) -> Roller:
     """Roller at ``seat`` with the profile that makes the rim envelope (or the named rough shape).
 
-    ``spheres`` is the number of spheres of a chain. Raises ArgumentError for an unknown shape, for fewer
-    than one sphere and for a roller that does not fit inside the outline.
+    ``spheres`` is the number of spheres of a chain. Raises ArgumentError for an unknown shape, for
+    fewer than one sphere and for a roller that does not fit inside the outline.
     """
     if shape not in SHAPES:
         raise ArgumentError("shape", shape, "one of " + ", ".join(SHAPES))
@@ -198,14 +208,18 @@ def place_roller(seat: Seat, support: Support, *, shape: Shape = "spheres", sphe
 
 
 def _aims(seat: Seat, spheres: int) -> FloatArray:
-    """Normal angles that stations must touch: sector end, one a sphere at even spacing, sector end."""
+    """Normal angles that stations must touch: sector end, one a sphere at even spacing, sector
+    end."""
     low, high = seat.sector
     inner = high - (np.arange(spheres) + 0.5) / spheres * (high - low)
     return np.concatenate([[high], inner, [low]])
 
 
-def _stations_for(aims: FloatArray, centre: FloatArray, axis: FloatArray, seat: Seat, support: Support) -> FloatArray:
-    """Stations [m] on the roller axis whose inscribed spheres touch the outline at normal angles ``aims``."""
+def _stations_for(
+    aims: FloatArray, centre: FloatArray, axis: FloatArray, seat: Seat, support: Support
+) -> FloatArray:
+    """Stations [m] on the roller axis whose inscribed spheres touch the outline at normal angles
+    ``aims``."""
     grid = np.linspace(-AXIS_REACH, AXIS_REACH, AXIS_SAMPLES)
     radii, touched = inscribed(centre + grid[:, None] * axis, support)
     middle = len(grid) // 2
@@ -213,22 +227,30 @@ def _stations_for(aims: FloatArray, centre: FloatArray, axis: FloatArray, seat: 
     low = int(outside[outside < middle].max(initial=-1)) + 1
     high = int(outside[outside > middle].min(initial=len(grid)))
     if radii[middle] < seat.radius - 1e-6 or high - low < 3:
-        raise ArgumentError("roller_radius", seat.radius, "a radius that fits inside the rim outline")
+        raise ArgumentError(
+            "roller_radius", seat.radius, "a radius that fits inside the rim outline"
+        )
     # m' = -t: the touched normal angle falls along the axis, np.interp wants it rising
     angles = np.unwrap(touched[low:high])
     angles += 2.0 * math.pi * round((seat.phi - float(angles[middle - low])) / (2.0 * math.pi))
     if aims.max() > angles[0] + 1e-6 or aims.min() < angles[-1] - 1e-6:
-        raise ArgumentError("rollers", seat.sector, "more rollers: one straight roller cannot serve this sector")
+        raise ArgumentError(
+            "rollers", seat.sector, "more rollers: one straight roller cannot serve this sector"
+        )
     stations: FloatArray = np.interp(aims, angles[::-1], grid[low:high][::-1])
     return stations
 
 
-def _barrel(centre: FloatArray, axis: FloatArray, support: Support, ends: tuple[float, float]) -> Revolved:
-    """Canal surface of the inscribed spheres, touched at ``s - r r'`` with radius ``r sqrt(1 - r'^2)``."""
+def _barrel(
+    centre: FloatArray, axis: FloatArray, support: Support, ends: tuple[float, float]
+) -> Revolved:
+    """Canal surface of the inscribed spheres, touched at ``s - r r'`` with radius ``r sqrt(1 -
+    r'^2)``."""
     step = 2e-4  # m; long enough to keep the noise of the minimum out of the derivative
     span = np.linspace(ends[0], ends[1], BARREL_STATIONS)
     before, here, after = (
-        inscribed(centre + (span + shift)[:, None] * axis, support)[0] for shift in (-step, 0.0, step)
+        inscribed(centre + (span + shift)[:, None] * axis, support)[0]
+        for shift in (-step, 0.0, step)
     )
     slope = (after - before) / (2.0 * step)
     return Revolved(_floats(span - here * slope), _floats(here * np.sqrt(1.0 - slope**2)))
@@ -237,8 +259,9 @@ def _barrel(centre: FloatArray, axis: FloatArray, support: Support, ends: tuple[
 def _ellipsoid(centre: FloatArray, axis: FloatArray, seat: Seat, support: Support) -> Ellipsoid:
     """Longest ellipsoid of revolution that touches the outline at ``seat.phi`` and stays inside it.
 
-    Its support function is c . m + sqrt(r^2 + (l^2 - r^2) (a . m)^2) <= h for every normal m. On a circle of
-    radius R the bound is tightest beside the seat: l^2 = r^2 + r (R - r)/cos^2(angle), from the curvatures.
+    Its support function is c . m + sqrt(r^2 + (l^2 - r^2) (a . m)^2) <= h for every normal m. On a
+    circle of radius R the bound is tightest beside the seat: l^2 = r^2 + r (R - r)/cos^2(angle),
+    from the curvatures.
     """
     phi = np.linspace(-math.pi, math.pi, ENVELOPE_SAMPLES, endpoint=False)
     lean = normals(phi) @ axis
@@ -269,13 +292,16 @@ def mecanum_wheel(
 ) -> RollerWheel:
     """Mecanum wheel: ``rollers`` equal rollers around a circular rim of ``radius`` [m].
 
-    ``angle`` [rad] is the axis of the roller on the ground, from x towards y: -45 deg at front-left and
-    rear-right, +45 deg at the others. ``mass`` [kg] is that of the whole wheel. 18 rollers of 9.5 mm and
-    5 spheres: measured settings for pybullet. Raises ArgumentError naming the size that cannot be built.
+    ``angle`` [rad] is the axis of the roller on the ground, from x towards y: -45 deg at front-left
+    and rear-right, +45 deg at the others. ``mass`` [kg] is that of the whole wheel. 18 rollers of
+    9.5 mm and 5 spheres: measured settings for pybullet. Raises ArgumentError naming the size that
+    cannot be built.
     """
     require_wheel(radius, roller_radius, angle, mass - rollers * roller_mass, roller_mass)
     if rollers < 3:
-        raise ArgumentError("rollers", rollers, "at least 3 rollers a wheel (12 or more roll smoothly)")
+        raise ArgumentError(
+            "rollers", rollers, "at least 3 rollers a wheel (12 or more roll smoothly)"
+        )
 
     def circle(phi: FloatArray) -> FloatArray:
         return np.full_like(phi, radius)
@@ -288,18 +314,29 @@ def mecanum_wheel(
     return RollerWheel(radius, width, angle, placed, mass - rollers * roller_mass, roller_mass)
 
 
-def require_wheel(radius: float, roller_radius: float, angle: float, hub_mass: float, roller_mass: float) -> None:
-    """Raise ArgumentError for sizes that make no wheel (all lengths in m, masses in kg, angle in rad)."""
+def require_wheel(
+    radius: float, roller_radius: float, angle: float, hub_mass: float, roller_mass: float
+) -> None:
+    """Raise ArgumentError for sizes that make no wheel (all lengths in m, masses in kg, angle in
+    rad)."""
     if not (math.isfinite(radius) and 0.0 < radius < 0.25):
         raise ArgumentError("radius", radius, "a wheel radius between 0 and 0.25 m")
     if not (math.isfinite(roller_radius) and 0.0 < roller_radius < radius / 2.0):
-        raise ArgumentError("roller_radius", roller_radius, "a radius from 0 to half the wheel radius, in m")
+        raise ArgumentError(
+            "roller_radius", roller_radius, "a radius from 0 to half the wheel radius, in m"
+        )
     if not (math.isfinite(angle) and 0.0 < abs(angle) < math.radians(80.0)):
-        raise ArgumentError("angle", angle, "a roller inclination between 0 and 80 deg either way, in rad")
+        raise ArgumentError(
+            "angle", angle, "a roller inclination between 0 and 80 deg either way, in rad"
+        )
     if not (math.isfinite(roller_mass) and roller_mass >= 0.01):
-        raise ArgumentError("roller_mass", roller_mass, "at least 0.01 kg (lighter ones upset contact solvers)")
+        raise ArgumentError(
+            "roller_mass", roller_mass, "at least 0.01 kg (lighter ones upset contact solvers)"
+        )
     if not (math.isfinite(hub_mass) and hub_mass > 0.0):
-        raise ArgumentError("mass", hub_mass, "a wheel heavier than its rollers, in kg (the rest is the hub)")
+        raise ArgumentError(
+            "mass", hub_mass, "a wheel heavier than its rollers, in kg (the rest is the hub)"
+        )
 
 
 def turned(roller: Roller, phi: float) -> Roller:
@@ -331,7 +368,8 @@ def _extent_along_axle(roller: Roller) -> tuple[float, float]:
 
 
 def support_height(wheel: RollerWheel, phi: FloatArray) -> FloatArray:
-    """Distance [m] from the axle down to the lowest point of the rollers when the place ``phi`` is down.
+    """Distance [m] from the axle down to the lowest point of the rollers when the place ``phi`` is
+    down.
 
     ``phi`` (K,) -> (K,): the support function of what was built, to be compared with the outline's.
     """
@@ -362,7 +400,9 @@ def revolve(profile: Revolved, *, sides: int = SIDES, shrink: float = 0.0) -> Fl
     for index, (station, radius) in enumerate(zip(profile.stations, profile.radii, strict=True)):
         along = station + (shrink if index == 0 else -shrink if index == last else 0.0)
         slim = max(radius - shrink, 1e-5)
-        rings.append(np.stack([slim * np.cos(around), slim * np.sin(around), np.full(sides, along)], axis=1))
+        rings.append(
+            np.stack([slim * np.cos(around), slim * np.sin(around), np.full(sides, along)], axis=1)
+        )
     return np.concatenate(rings)
 
 
@@ -372,7 +412,8 @@ def disc_inertia(mass: float, radius: float, length: float) -> tuple[float, floa
 
 
 def hub_drum(wheel: RollerWheel) -> Revolved:
-    """What pictures show of a hub: a drum about the axle, slim enough for the ellipse of an SMDW hub."""
+    """What pictures show of a hub: a drum about the axle, slim enough for the ellipse of an SMDW
+    hub."""
     half = 0.4 * wheel.width
     return Revolved((-half, half), (0.35 * wheel.radius, 0.35 * wheel.radius))
 

@@ -19,10 +19,11 @@ class Flat:
 
 @dataclass(frozen=True)
 class Step:
-    """A block on level ground: ``height`` [m], the middle of its front edge at ``place`` (x, y) [m].
+    """A block on level ground: ``height`` [m], the middle of its front edge at ``place`` (x, y)
+    [m].
 
-    ``direction`` [rad] is the yaw in which it extends by ``depth`` [m] behind the edge, ``width`` [m] the
-    length of the edge.
+    ``direction`` [rad] is the yaw in which it extends by ``depth`` [m] behind the edge, ``width``
+    [m] the length of the edge.
     """
 
     height: float
@@ -41,7 +42,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Ramp:
-    """A tilted plate: its foot edge on the ground at ``place`` (x, y) [m], rising by ``slope`` [rad].
+    """A tilted plate: its foot edge on the ground at ``place`` (x, y) [m], rising by ``slope``
+    [rad].
 
     ``direction`` [rad] is the yaw in which it rises over ``length`` [m] (measured along the plate),
     ``width`` [m] the length of the foot edge.
@@ -66,7 +68,8 @@ Terrain = Flat | Step | Ramp
 
 @dataclass(frozen=True)
 class Block:
-    """A solid box: ``centre`` [m], full ``size`` [m], turned by ``pitch`` about y, then ``yaw`` about z."""
+    """A solid box: ``centre`` [m], full ``size`` [m], turned by ``pitch`` about y, then ``yaw``
+    about z."""
 
     centre: Vector
     size: Vector
@@ -92,14 +95,20 @@ def blocks(terrain: Terrain) -> tuple[Block, ...]:
     x, y = terrain.place
     if isinstance(terrain, Step):
         half = terrain.depth / 2.0
-        centre = (x + half * cosine, y + half * sine, terrain.height - plate / 2.0 - terrain.height / 2.0)
+        centre = (
+            x + half * cosine,
+            y + half * sine,
+            terrain.height - plate / 2.0 - terrain.height / 2.0,
+        )
         size = (terrain.depth, terrain.width, terrain.height + plate)
         return (Block(centre, size, terrain.direction, 0.0),)
     half = terrain.length / 2.0
     along = half * math.cos(terrain.slope) + plate / 2.0 * math.sin(terrain.slope)
     up = half * math.sin(terrain.slope) - plate / 2.0 * math.cos(terrain.slope)
     size = (terrain.length, terrain.width, plate)
-    return (Block((x + along * cosine, y + along * sine, up), size, terrain.direction, -terrain.slope),)
+    return (
+        Block((x + along * cosine, y + along * sine, up), size, terrain.direction, -terrain.slope),
+    )
 
 
 @dataclass(frozen=True)
@@ -111,7 +120,9 @@ class Scene:
 
     def __post_init__(self) -> None:
         """Raise ArgumentError for a friction at which no wheel can drive."""
-        require("friction", self.friction, low=0.0, expected="a positive coefficient (0 drives nowhere)")
+        require(
+            "friction", self.friction, low=0.0, expected="a positive coefficient (0 drives nowhere)"
+        )
         blocks(self.terrain)
 
 

@@ -1,10 +1,10 @@
 """The semi-circular Mecanum double wheel (SMDW) as rollers: two hubs, half circle and half ellipse.
 
-SMDW thesis, section 4.1: each hub's outline is a half circle of radius Rc joined to a half ellipse of
-half-axes Rc and Re; the hubs sit side by side on one axle, half a turn apart, so that on flat ground one
-half circle always carries. At wheel angle 0 the outer hub has its ellipse down (the neutral position of
-Figure 4.3, largest clearance for lateral motion). The hubs of left and right wheels are mirrored
-(section 2.3.2), so this holds on both sides of the robot.
+SMDW thesis, section 4.1: each hub's outline is a half circle of radius Rc joined to a half ellipse
+of half-axes Rc and Re; the hubs sit side by side on one axle, half a turn apart, so that on flat
+ground one half circle always carries. At wheel angle 0 the outer hub has its ellipse down (the
+neutral position of Figure 4.3, largest clearance for lateral motion). The hubs of left and right
+wheels are mirrored (section 2.3.2), so this holds on both sides of the robot.
 """
 
 from __future__ import annotations
@@ -54,12 +54,14 @@ def smdw_wheel(
 ) -> RollerWheel:
     """SMDW wheel; ``outer_left`` says that the hub with its ellipse down at angle 0 sits at +y.
 
-    ``angle`` [rad] is the axis of the roller on the ground, from x towards y. Lengths [m], masses [kg].
-    The rollers of the ellipse share its length evenly. Raises ArgumentError naming the size that cannot
-    be built.
+    ``angle`` [rad] is the axis of the roller on the ground, from x towards y. Lengths [m], masses
+    [kg]. The rollers of the ellipse share its length evenly. Raises ArgumentError naming the size
+    that cannot be built.
     """
     if circle_rollers < 2 or ellipse_rollers < 2:
-        raise ArgumentError("rollers", (circle_rollers, ellipse_rollers), "at least 2 on each half of a hub")
+        raise ArgumentError(
+            "rollers", (circle_rollers, ellipse_rollers), "at least 2 on each half of a hub"
+        )
     hub_mass = mass - 2 * (circle_rollers + ellipse_rollers) * roller_mass
     for radius in (circle_roller_radius, ellipse_roller_radius):
         require_wheel(sizes.radius, radius, angle, hub_mass, roller_mass)
@@ -102,12 +104,19 @@ def shifted(roller: Roller, offset: float) -> Roller:
     return Roller((x, y + offset, z), roller.axis, roller.profile)
 
 
-def loc8_smdw(sizes: DoubleWheel = DEFAULT_WHEEL, *, shape: Shape = "spheres", spheres: int = 7,
-              torque_limit: float = TORQUE_LIMIT) -> SimRobot:
+def loc8_smdw(
+    sizes: DoubleWheel = DEFAULT_WHEEL,
+    *,
+    shape: Shape = "spheres",
+    spheres: int = 7,
+    torque_limit: float = TORQUE_LIMIT,
+) -> SimRobot:
     """LOC8 on four SMDW wheels whose rollers stand at -45, +45, +45, -45 deg on the ground.
 
     ``spheres`` a roller, torque [N m]. Raises ArgumentError naming the size that makes no robot.
     """
-    wheels = tuple(smdw_wheel(sizes, angle=angle, outer_left=left, shape=shape, spheres=spheres)
-                   for angle, left in zip(ROLLER_ANGLES, (True, False, True, False), strict=True))
+    wheels = tuple(
+        smdw_wheel(sizes, angle=angle, outer_left=left, shape=shape, spheres=spheres)
+        for angle, left in zip(ROLLER_ANGLES, (True, False, True, False), strict=True)
+    )
     return loc8_on(wheels, name=f"LOC8 SMDW ({shape})", torque_limit=torque_limit)

@@ -21,8 +21,8 @@ from trajopt.simulate.engine import (
     SimRobot,
 )
 
-# A run has left physics beyond these (chosen: an order above anything a robot that drives at 5 km/h and
-# climbs 5 cm shows).
+# A run has left physics beyond these (chosen: an order above anything a robot that drives at 5 km/h
+# and climbs 5 cm shows).
 MAX_SPEED = 10.0  # m/s of the robot frame
 MAX_HEIGHT = 1.0  # m of the robot frame above the ground
 MAX_PENETRATION = 0.02  # m of a roller into the terrain
@@ -39,7 +39,9 @@ class Pace:
     def __post_init__(self) -> None:
         """Raise ArgumentError for a step outside (0, 20 ms] or a stride below 1."""
         if not 0.0 < self.step <= 0.02:
-            raise ArgumentError("step", self.step, "a time step in (0, 0.02] s; 0.002 s is accurate")
+            raise ArgumentError(
+                "step", self.step, "a time step in (0, 0.02] s; 0.002 s is accurate"
+            )
         if self.stride < 1:
             raise ArgumentError("stride", self.stride, "at least 1 step a record")
 
@@ -55,11 +57,13 @@ def drive(
     picture: Camera | None,
     controller: Controller | None,
 ) -> Recording:
-    """Hold still for ``settle`` seconds, then execute the command and record every ``pace.stride`` steps.
+    """Hold still for ``settle`` seconds, then execute the command and record every ``pace.stride``
+    steps.
 
     Targets are taken in the middle of each step, so that the commanded angle is the integral of the
-    command. ``controller`` (time, observation) -> wheel speeds (4,) replaces the command's speeds at
-    every record. ``label`` is the engine's name and version. Raises ArgumentError for a bad ``settle``.
+    command. ``controller`` (time, observation) -> wheel speeds (4,) replaces the command's speeds
+    at every record. ``label`` is the engine's name and version. Raises ArgumentError for a bad
+    ``settle``.
     """
     if not (math.isfinite(settle) and settle >= 0.0):
         raise ArgumentError("settle", settle, "a time of at least 0 s")

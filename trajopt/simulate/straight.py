@@ -1,4 +1,5 @@
-"""The simulator's own test: drive straight and compare with kinematics (SMDW thesis, section 5.3)."""
+"""The simulator's own test: drive straight and compare with kinematics (SMDW thesis, section
+5.3)."""
 
 from __future__ import annotations
 
@@ -21,19 +22,22 @@ DIRECTIONS: tuple[tuple[str, float], ...] = (
 
 @dataclass(frozen=True)
 class Deviation:
-    """Final place minus the commanded one: ``along``, ``across`` as shares of the distance, ``yaw`` [rad]."""
+    """Final place minus the commanded one: ``along``, ``across`` as shares of the distance, ``yaw``
+    [rad]."""
 
     along: float
     across: float
     yaw: float
 
 
-def straight_command(robot: SimRobot, direction: float, distance: float, speed: float, *, ramp: float = 0.5) -> Command:
+def straight_command(
+    robot: SimRobot, direction: float, distance: float, speed: float, *, ramp: float = 0.5
+) -> Command:
     """Wheel speeds that carry ``robot`` straight by ``distance`` [m] at ``speed`` [m/s].
 
-    ``direction`` [rad] in the body, ``ramp`` [s] to full speed and to rest again (chosen: 1.7 m/s^2 at
-    3 km/h, below what friction transmits). Raises ArgumentError for a distance, speed or ramp that is not
-    positive, and for a distance too short to reach full speed.
+    ``direction`` [rad] in the body, ``ramp`` [s] to full speed and to rest again (chosen: 1.7 m/s^2
+    at 3 km/h, below what friction transmits). Raises ArgumentError for a distance, speed or ramp
+    that is not positive, and for a distance too short to reach full speed.
     """
     for name, value in (("distance", distance), ("speed", speed), ("ramp", ramp)):
         require(name, value, low=0.0, expected="a positive number")
@@ -42,7 +46,9 @@ def straight_command(robot: SimRobot, direction: float, distance: float, speed: 
     end = distance / speed + ramp
     full = robot.wheel_speeds(speed * math.cos(direction), speed * math.sin(direction), 0.0)
     share = np.array([0.0, 1.0, 1.0, 0.0]) if end > 2.0 * ramp else np.array([0.0, 1.0, 0.0])
-    times = np.array([0.0, ramp, end - ramp, end]) if end > 2.0 * ramp else np.array([0.0, ramp, end])
+    times = (
+        np.array([0.0, ramp, end - ramp, end]) if end > 2.0 * ramp else np.array([0.0, ramp, end])
+    )
     return Command(times, share[:, None] * full[None, :])
 
 

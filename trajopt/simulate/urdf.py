@@ -1,4 +1,5 @@
-"""A SimRobot as URDF text (Unified Robot Description Format), with meshes beside it where needed."""
+"""A SimRobot as URDF text (Unified Robot Description Format), with meshes beside it where
+needed."""
 
 from __future__ import annotations
 
@@ -23,13 +24,17 @@ from trajopt.simulate.rollers import (
 )
 
 CHASSIS_COLOUR = "0.25 0.35 0.55 1"
-ROLLER_COLOURS = ("0.15 0.15 0.15 1", "0.85 0.45 0.1 1")  # every other roller: turning shows in pictures
+ROLLER_COLOURS = (
+    "0.15 0.15 0.15 1",
+    "0.85 0.45 0.1 1",
+)  # every other roller: turning shows in pictures
 HUB_COLOUR = "0.7 0.7 0.72 1"
 
 
 @dataclass(frozen=True)
 class _Style:
-    """How parts are written: mesh files by profile, the margin [m] of the engine, with visuals or not."""
+    """How parts are written: mesh files by profile, the margin [m] of the engine, with visuals or
+    not."""
 
     meshes: dict[Revolved, str]
     margin: float
@@ -37,15 +42,18 @@ class _Style:
 
 
 def robot_urdf(robot: SimRobot, folder: Path, *, margin: float, visible: bool) -> str:
-    """URDF of ``robot``; meshes go into ``folder``, shrunk by the ``margin`` [m] that the engine adds.
+    """URDF of ``robot``; meshes go into ``folder``, shrunk by the ``margin`` [m] that the engine
+    adds.
 
-    The base frame is the chassis' centre of gravity. Joints are called ``wheel_0`` to ``wheel_3`` and
-    ``roller_<wheel>_<roller>``. ``visible`` adds visual shapes. Raises ArgumentError for an ellipsoid
-    roller, which URDF does not know.
+    The base frame is the chassis' centre of gravity. Joints are called ``wheel_0`` to ``wheel_3``
+    and ``roller_<wheel>_<roller>``. ``visible`` adds visual shapes. Raises ArgumentError for an
+    ellipsoid roller, which URDF does not know.
     """
     profiles = [roller.profile for wheel in robot.wheels for roller in wheel.rollers]
     solids = [p for p in dict.fromkeys(profiles) if isinstance(p, Revolved) and not is_cylinder(p)]
-    style = _Style({profile: f"mesh_{index}.obj" for index, profile in enumerate(solids)}, margin, visible)
+    style = _Style(
+        {profile: f"mesh_{index}.obj" for index, profile in enumerate(solids)}, margin, visible
+    )
     for profile, file in style.meshes.items():
         (folder / file).write_text(_obj(revolve(profile, shrink=margin), profile), encoding="utf-8")
     parts = [f'<?xml version="1.0"?>\n<robot name="robot">\n{_chassis(robot, visible)}']
@@ -58,7 +66,11 @@ def robot_urdf(robot: SimRobot, folder: Path, *, margin: float, visible: bool) -
         (folder / f"hub_{index}.obj").write_text(_obj(revolve(drum), drum), encoding="utf-8")
         for number, roller in enumerate(wheel.rollers):
             name = f"roller_{index}_{number}"
-            parts.append(_joint(name, f"hub_{index}", f"{name}_link", roller.centre, _attitude(roller), "0 0 1"))
+            parts.append(
+                _joint(
+                    name, f"hub_{index}", f"{name}_link", roller.centre, _attitude(roller), "0 0 1"
+                )
+            )
             parts.append(_roller(f"{name}_link", number, wheel, roller, style))
     parts.append("</robot>\n")
     return "".join(parts)
@@ -117,7 +129,9 @@ def _shapes(roller: Roller, style: _Style) -> list[str]:
             size = f'<cylinder radius="{profile.radii[0]!r}" length="{high - low!r}"/>'
             return [f'<origin xyz="0 0 {(low + high) / 2.0!r}"/><geometry>{size}</geometry>']
         return [f'<geometry><mesh filename="{style.meshes[profile]}"/></geometry>']
-    raise ArgumentError("shape", "ellipsoid", "spheres, barrel, cylinder or cone (URDF has no ellipsoid)")
+    raise ArgumentError(
+        "shape", "ellipsoid", "spheres, barrel, cylinder or cone (URDF has no ellipsoid)"
+    )
 
 
 def _obj(vertices: FloatArray, profile: Revolved) -> str:
@@ -138,7 +152,9 @@ def _obj(vertices: FloatArray, profile: Revolved) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _joint(name: str, parent: str, child: str, place: tuple[float, float, float], rpy: str, axis: str) -> str:
+def _joint(
+    name: str, parent: str, child: str, place: tuple[float, float, float], rpy: str, axis: str
+) -> str:
     return (
         f'<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/>'
         f'<origin xyz="{_numbers(place)}" rpy="{rpy}"/><axis xyz="{axis}"/></joint>\n'
@@ -146,7 +162,8 @@ def _joint(name: str, parent: str, child: str, place: tuple[float, float, float]
 
 
 def _attitude(roller: Roller) -> str:
-    """Roll-pitch-yaw that turns z onto the roller axis: first about y by the polar angle, then about z."""
+    """Roll-pitch-yaw that turns z onto the roller axis: first about y by the polar angle, then
+    about z."""
     x, y, z = roller.axis
     return f"0 {math.atan2(math.hypot(x, y), z)!r} {math.atan2(y, x)!r}"
 

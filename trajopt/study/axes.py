@@ -1,9 +1,10 @@
-"""What a sweep varies: axes of a sweep file, combined by product, zip and joint samples, as columns.
+"""What a sweep varies: axes of a sweep file, combined by product, zip and joint samples, as
+columns.
 
-``[axes."scene.friction"]`` holds one of ``values = [...]``, ``range = [from, to, count]``,
-``log = [from, to, count]``, or ``random = {...}`` with a distribution, ``count`` and ``seed``. Axes with the
-same ``zip = "group"`` run in step; all others multiply. ``[sample]`` draws jointly (``method`` = "random",
-"latin-hypercube" or "sobol") over ``[sample.axes]`` and multiplies as one more axis.
+``[axes."scene.friction"]`` holds one of ``values = [...]``, ``range = [from, to, count]``, ``log =
+[from, to, count]``, or ``random = {...}`` with a distribution, ``count`` and ``seed``. Axes with
+the same ``zip = "group"`` run in step; all others multiply. ``[sample]`` draws jointly (``method``
+= "random", "latin-hypercube" or "sobol") over ``[sample.axes]`` and multiplies as one more axis.
 """
 
 from __future__ import annotations
@@ -27,15 +28,22 @@ _KINDS = ("values", "range", "log", "random")
 _METHODS = ("random", "latin-hypercube", "sobol")
 
 
-def combined(axes: Mapping[str, Mapping[str, Any]], sample: Mapping[str, Any] | None = None) -> dict[str, Array]:
-    """Columns of all combinations; the last axis varies fastest. Raises ArgumentError for a wrong axis."""
+def combined(
+    axes: Mapping[str, Mapping[str, Any]], sample: Mapping[str, Any] | None = None
+) -> dict[str, Array]:
+    """Columns of all combinations; the last axis varies fastest. Raises ArgumentError for a wrong
+    axis."""
     groups: dict[str, dict[str, Array]] = {}
     for name, axis in axes.items():
         group = axis.get("zip")
-        groups.setdefault(f"zip {group}" if group is not None else f"axis {name}", {})[name] = axis_values(name, axis)
+        groups.setdefault(f"zip {group}" if group is not None else f"axis {name}", {})[name] = (
+            axis_values(name, axis)
+        )
     for key, columns in groups.items():
         if len({len(c) for c in columns.values()}) > 1:
-            raise ArgumentError(key, {n: len(c) for n, c in columns.items()}, "zipped axes of equal length")
+            raise ArgumentError(
+                key, {n: len(c) for n, c in columns.items()}, "zipped axes of equal length"
+            )
     if sample:
         groups["sample"] = _joint(sample)
     sizes = [len(next(iter(columns.values()))) for columns in groups.values()]
@@ -49,7 +57,9 @@ def combined(axes: Mapping[str, Mapping[str, Any]], sample: Mapping[str, Any] | 
         places = np.arange(total) // max(inner, 1) % max(size, 1)
         for name, column in columns.items():
             if name in result:
-                raise ArgumentError(f"axes.{name}", "given twice", "each name once, in axes or in sample.axes")
+                raise ArgumentError(
+                    f"axes.{name}", "given twice", "each name once, in axes or in sample.axes"
+                )
             result[name] = column[places]
     return result
 
@@ -60,7 +70,9 @@ def axis_values(name: str, axis: Mapping[str, Any]) -> Array:
     given = [kind for kind in _KINDS if kind in axis]
     unknown = set(axis) - {*_KINDS, "zip"}
     if unknown or len(given) != 1:
-        raise ArgumentError(where, dict(axis), "one of values, range, log, random (and zip, where wanted)")
+        raise ArgumentError(
+            where, dict(axis), "one of values, range, log, random (and zip, where wanted)"
+        )
     if given[0] == "random":
         return _independent(name, axis["random"])
     values = axis[given[0]]
@@ -68,8 +80,13 @@ def axis_values(name: str, axis: Mapping[str, Any]) -> Array:
         if not isinstance(values, Sequence) or isinstance(values, str) or not values:
             raise ArgumentError(where, values, "a list with at least one value")
         return as_column(where, values)
-    if (not isinstance(values, Sequence) or len(values) != 3 or isinstance(values[2], bool)
-            or not isinstance(values[2], int) or values[2] < 1):
+    if (
+        not isinstance(values, Sequence)
+        or len(values) != 3
+        or isinstance(values[2], bool)
+        or not isinstance(values[2], int)
+        or values[2] < 1
+    ):
         raise ArgumentError(where, values, "[from, to, count] with a whole count >= 1")
     low, high, count = values
     if given[0] == "range":
@@ -80,8 +97,11 @@ def axis_values(name: str, axis: Mapping[str, Any]) -> Array:
     return as_column(where, np.geomspace(low, high, count))
 
 
-def with_derived(columns: dict[str, Array], derived: Mapping[str, str], exclude: Sequence[str]) -> dict[str, Array]:
-    """Columns with derived values (an expression a name) added and excluded cases (an expression each) removed."""
+def with_derived(
+    columns: dict[str, Array], derived: Mapping[str, str], exclude: Sequence[str]
+) -> dict[str, Array]:
+    """Columns with derived values (an expression a name) added and excluded cases (an expression
+    each) removed."""
     if not derived and not exclude:
         return columns
     formulas = {name: parse(str(text)) for name, text in derived.items()}
@@ -102,14 +122,19 @@ def with_derived(columns: dict[str, Array], derived: Mapping[str, str], exclude:
         for name in formulas:
             made[name].append(values[name])
     places = np.array(kept, dtype=np.int64)
-    return {**{n: c[places] for n, c in columns.items()}, **{n: as_column(n, v) for n, v in made.items()}}
+    return {
+        **{n: c[places] for n, c in columns.items()},
+        **{n: as_column(n, v) for n, v in made.items()},
+    }
 
 
 def _independent(name: str, spec: Mapping[str, Any]) -> Array:
     """Random draws of one axis; the stream depends on the seed and the axis' name."""
     seed, count = spec.get("seed"), spec.get("count")
     if not _whole(seed, 0) or not _whole(count, 1):
-        raise ArgumentError(f"axes.{name}.random", dict(spec), "a whole seed >= 0 and a whole count >= 1")
+        raise ArgumentError(
+            f"axes.{name}.random", dict(spec), "a whole seed >= 0 and a whole count >= 1"
+        )
     digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
     rng = np.random.default_rng([int(seed), int.from_bytes(digest, "little")])  # type: ignore[arg-type]
     draws: Array = rng.random((int(count),))  # type: ignore[arg-type]
@@ -121,11 +146,15 @@ def _joint(sample: Mapping[str, Any]) -> dict[str, Array]:
     unknown = set(sample) - {"method", "count", "seed", "axes"}
     method, count, seed, axes = (sample.get(k) for k in ("method", "count", "seed", "axes"))
     if unknown or method not in _METHODS or not _whole(count, 1) or not _whole(seed, 0) or not axes:
-        raise ArgumentError("sample", dict(sample), f"method ({', '.join(_METHODS)}), count, seed and axes")
+        raise ArgumentError(
+            "sample", dict(sample), f"method ({', '.join(_METHODS)}), count, seed and axes"
+        )
     assert isinstance(axes, Mapping)
     draws = _unit_draws(str(method), int(count), len(axes), int(seed))  # type: ignore[arg-type]
-    return {name: as_column(name, _quantile(f"sample.axes.{name}", spec)(draws[:, i]))
-            for i, (name, spec) in enumerate(axes.items())}
+    return {
+        name: as_column(name, _quantile(f"sample.axes.{name}", spec)(draws[:, i]))
+        for i, (name, spec) in enumerate(axes.items())
+    }
 
 
 def _unit_draws(method: str, count: int, dimension: int, seed: int) -> NDArray[np.float64]:
@@ -135,20 +164,27 @@ def _unit_draws(method: str, count: int, dimension: int, seed: int) -> NDArray[n
         return rng.random((count, dimension))
     from scipy.stats import qmc
 
-    sampler = (qmc.LatinHypercube(dimension, rng=rng) if method == "latin-hypercube"
-               else qmc.Sobol(dimension, rng=rng))
+    sampler = (
+        qmc.LatinHypercube(dimension, rng=rng)
+        if method == "latin-hypercube"
+        else qmc.Sobol(dimension, rng=rng)
+    )
     # Sobol points are balanced only in powers of two: draw up to the next one and keep the first.
-    drawn = sampler.random(count) if method == "latin-hypercube" else sampler.random_base2(
-        max(0, math.ceil(math.log2(count))))[:count]
+    drawn = (
+        sampler.random(count)
+        if method == "latin-hypercube"
+        else sampler.random_base2(max(0, math.ceil(math.log2(count))))[:count]
+    )
     unit: NDArray[np.float64] = np.clip(np.asarray(drawn), 1e-12, 1 - 1e-12)
     return unit
 
 
 def _quantile(where: str, spec: Mapping[str, Any]) -> Callable[[Array], Array]:
-    """Inverse distribution: uniform = [low, high], log-uniform, normal = [mean, deviation], choice = [...]."""
+    """Inverse distribution: uniform = [low, high], log-uniform, normal = [mean, deviation], choice
+    = [...]."""
     if len(spec) != 1:
         raise ArgumentError(where, dict(spec), "one of uniform, log-uniform, normal, choice")
-    (kind, values), = spec.items()
+    ((kind, values),) = spec.items()
     if kind == "choice" and isinstance(values, list) and values:
         options = as_column(where, values)
         return lambda u: options[np.minimum((u * len(options)).astype(np.int64), len(options) - 1)]
@@ -163,8 +199,11 @@ def _quantile(where: str, spec: Mapping[str, Any]) -> Callable[[Array], Array]:
         from scipy.special import ndtri
 
         return lambda u: a + b * ndtri(np.clip(u, 1e-12, 1 - 1e-12))
-    raise ArgumentError(where, dict(spec), "uniform or log-uniform with low < high, normal with deviation > 0, "
-                                           "or choice with a list")
+    raise ArgumentError(
+        where,
+        dict(spec),
+        "uniform or log-uniform with low < high, normal with deviation > 0, or choice with a list",
+    )
 
 
 def _whole(value: Any, least: int) -> bool:

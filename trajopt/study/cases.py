@@ -1,8 +1,8 @@
 """Cases of a sweep: their values, their identity and their seeds.
 
-A case is a mapping of names to plain values. Its identity is a hash of that content together with what it is
-run on (problem, run function, code version); its seed comes from the identity. So nothing depends on the
-order of cases, on how they are chunked, or on how many workers there are.
+A case is a mapping of names to plain values. Its identity is a hash of that content together with
+what it is run on (problem, run function, code version); its seed comes from the identity. So
+nothing depends on the order of cases, on how they are chunked, or on how many workers there are.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ _INT64 = 2**63
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One case: ``id`` (32 hexadecimal digits) and its values by name; ``case["name"]`` is one value."""
+    """One case: ``id`` (32 hexadecimal digits) and its values by name; ``case["name"]`` is one
+    value."""
 
     id: str
     values: Mapping[str, Any]
@@ -49,8 +50,8 @@ class Case:
 class CaseTable:
     """Cases as columns, which keeps a million of them small.
 
-    ``columns`` maps names to arrays (n,): bool, int64, float64, or object. ``ids`` (n,) are the identities as
-    bytes. Equal cases appear once.
+    ``columns`` maps names to arrays (n,): bool, int64, float64, or object. ``ids`` (n,) are the
+    identities as bytes. Equal cases appear once.
     """
 
     columns: Mapping[str, NDArray[Any]]
@@ -61,22 +62,29 @@ class CaseTable:
 
     def take(self, positions: NDArray[np.int64]) -> CaseTable:
         """The cases at ``positions``."""
-        return CaseTable({name: column[positions] for name, column in self.columns.items()}, self.ids[positions])
+        return CaseTable(
+            {name: column[positions] for name, column in self.columns.items()}, self.ids[positions]
+        )
 
     def rows(self) -> list[Case]:
         """All cases, one object each."""
         names = list(self.columns)
         lists = [column.tolist() for column in self.columns.values()]
         values = zip(*lists, strict=True) if lists else iter([()] * len(self))
-        return [Case(key.decode(), dict(zip(names, row, strict=True)))
-                for key, row in zip(self.ids.tolist(), values, strict=True)]
+        return [
+            Case(key.decode(), dict(zip(names, row, strict=True)))
+            for key, row in zip(self.ids.tolist(), values, strict=True)
+        ]
 
 
-def case_table(cases: Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]], base: bytes = b"") -> CaseTable:
-    """Table of cases, given as mappings with equal keys or as columns; ``base`` comes from ``identity_base``.
+def case_table(
+    cases: Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]], base: bytes = b""
+) -> CaseTable:
+    """Table of cases, given as mappings with equal keys or as columns; ``base`` comes from
+    ``identity_base``.
 
-    Raises ArgumentError for unequal keys, reserved names, and values that are not finite numbers, texts,
-    booleans, None, or lists and mappings of those.
+    Raises ArgumentError for unequal keys, reserved names, and values that are not finite numbers,
+    texts, booleans, None, or lists and mappings of those.
     """
     if isinstance(cases, Mapping):
         columns = {name: as_column(name, values) for name, values in cases.items()}
@@ -84,7 +92,9 @@ def case_table(cases: Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]], 
         columns = _columns_of(cases)
     sizes = {len(c) for c in columns.values()}
     if len(sizes) > 1:
-        raise ArgumentError("cases", {name: len(c) for name, c in columns.items()}, "columns of equal length")
+        raise ArgumentError(
+            "cases", {name: len(c) for name, c in columns.items()}, "columns of equal length"
+        )
     ids = _identities(columns, base, sizes.pop() if sizes else 0)
     _, first = np.unique(ids, return_index=True)
     table = CaseTable(columns, ids)
@@ -92,13 +102,17 @@ def case_table(cases: Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]], 
 
 
 def identity_base(run: str, problem: Any, code: str) -> bytes:
-    """What all identities of a sweep share: name of the run function, content of the problem, code version."""
-    text = json.dumps([run, canonical("problem", problem), code], sort_keys=True, separators=(",", ":"))
+    """What all identities of a sweep share: name of the run function, content of the problem, code
+    version."""
+    text = json.dumps(
+        [run, canonical("problem", problem), code], sort_keys=True, separators=(",", ":")
+    )
     return hashlib.blake2b(text.encode(), digest_size=ID_BYTES).digest()
 
 
 def canonical(name: str, value: Any) -> Any:
-    """A value in plain Python: finite numbers (-0.0 becomes 0.0), texts, booleans, None, lists, mappings.
+    """A value in plain Python: finite numbers (-0.0 becomes 0.0), texts, booleans, None, lists,
+    mappings.
 
     Raises ArgumentError for anything else.
     """
@@ -120,7 +134,9 @@ def canonical(name: str, value: Any) -> Any:
         return [canonical(name, v) for v in value]
     if isinstance(value, Mapping) and all(isinstance(k, str) for k in value):
         return {k: canonical(f"{name}.{k}", value[k]) for k in sorted(value)}
-    raise ArgumentError(name, value, "numbers, texts, booleans, None, or lists and mappings of those")
+    raise ArgumentError(
+        name, value, "numbers, texts, booleans, None, or lists and mappings of those"
+    )
 
 
 def as_column(name: str, values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
@@ -154,7 +170,9 @@ def _columns_of(cases: Iterable[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
             names = list(case)
             values = {name: [] for name in names}
         if case.keys() != values.keys():
-            raise ArgumentError("cases", sorted(case), f"the same names in every case ({sorted(values)})")
+            raise ArgumentError(
+                "cases", sorted(case), f"the same names in every case ({sorted(values)})"
+            )
         for name in names:
             values[name].append(case[name])
     return {name: as_column(name, column) for name, column in values.items()}

@@ -1,7 +1,7 @@
 """The process that runs cases: loads a run function, runs what its host sends, and sends rows back.
 
-It may die at any time, by a case's fault; its host (``host.py``) then knows which case it was from a few bytes
-of memory they share. Standard output and error are the host's to read.
+It may die at any time, by a case's fault; its host (``host.py``) then knows which case it was from
+a few bytes of memory they share. Standard output and error are the host's to read.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from trajopt.study.cases import Case
 from trajopt.study.rows import DONE, ERROR, Row, results_of
 from trajopt.study.runfunction import RunFunction, unpacked
 
-# Monotonic time at which the case in work started (s), then its index (-1: none). The time comes first: the host may
-# read while both change, and an old index with a new time harms nobody.
+# Monotonic time at which the case in work started (s), then its index (-1: none). The time comes
+# first: the host may read while both change, and an old index with a new time harms nobody.
 PROGRESS = struct.Struct("<dq")
 _FLUSH_INTERVAL = 0.05  # s between messages to the host: what a crash makes run again; chosen
 _PR_SET_PDEATHSIG = 1  # Linux, prctl(2)
@@ -35,8 +35,16 @@ _TRACEBACK_LINES = 40  # chosen
 _LONGEST_MESSAGE = 2_000  # characters of an error message kept; chosen
 
 # One thread a worker: what BLAS, OpenMP and numba read at import.
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS",
-                    "VECLIB_MAXIMUM_THREADS", "BLIS_NUM_THREADS", "NUMEXPR_NUM_THREADS", "ARROW_NUM_THREADS")
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "ARROW_NUM_THREADS",
+)
 
 
 def main(connection_handle: int, progress_handle: int, parent: int, memory_limit: int) -> None:
@@ -79,8 +87,9 @@ def main(connection_handle: int, progress_handle: int, parent: int, memory_limit
 
 
 def note_progress(progress: mmap.mmap, index: int) -> None:
-    """Say that case ``index`` (-1: none) starts now. One copy: ``pack_into`` would write zeros first, which the host
-    could read as a case that has been running since the machine was started."""
+    """Say that case ``index`` (-1: none) starts now. One copy: ``pack_into`` would write zeros
+    first, which the host could read as a case that has been running since the machine was
+    started."""
     progress[:] = PROGRESS.pack(time.monotonic(), index)
 
 
@@ -94,9 +103,20 @@ def _row(run: RunFunction, index: int, case: Case) -> Row:
     started, clock = time.time(), time.perf_counter()
     try:
         results, arrays = results_of(run(case))
-    except BaseException as error:  # SystemExit and KeyboardInterrupt of a case are that case's errors
-        return Row(index, ERROR, {}, {}, type(error).__name__, _message(error), _traceback(error), started,
-                   time.perf_counter() - clock)
+    except (
+        BaseException
+    ) as error:  # SystemExit and KeyboardInterrupt of a case are that case's errors
+        return Row(
+            index,
+            ERROR,
+            {},
+            {},
+            type(error).__name__,
+            _message(error),
+            _traceback(error),
+            started,
+            time.perf_counter() - clock,
+        )
     return Row(index, DONE, results, arrays, "", "", "", started, time.perf_counter() - clock)
 
 
@@ -123,7 +143,8 @@ def _traceback(error: BaseException) -> str:
 
 
 def _die_with_parent(parent: int) -> None:
-    """End when the host ends, however it ends: by the kernel on Linux, and by looking on every system."""
+    """End when the host ends, however it ends: by the kernel on Linux, and by looking on every
+    system."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:

@@ -1,7 +1,7 @@
 """Drives chunks through an executor: sizes them by measured time, and survives workers that die.
 
-A chunk whose worker died is tried again; after three more deaths it runs alone, and from then on halves that
-die are halved again, until the one case whose worker always dies is found and recorded.
+A chunk whose worker died is tried again; after three more deaths it runs alone, and from then on
+halves that die are halved again, until the one case whose worker always dies is found and recorded.
 """
 
 from __future__ import annotations
@@ -24,14 +24,27 @@ from numpy.typing import NDArray
 from trajopt.errors import TrajoptError
 from trajopt.study.cases import CaseTable
 from trajopt.study.engines import Engine
-from trajopt.study.host import RETRIES, CaseLimits, ChunkJob, ChunkReport, run_chunk, stop_mark, warm_up
+from trajopt.study.host import (
+    RETRIES,
+    CaseLimits,
+    ChunkJob,
+    ChunkReport,
+    run_chunk,
+    stop_mark,
+    warm_up,
+)
 from trajopt.study.rows import CRASHED, Kind, Row, row_table
 from trajopt.study.runfunction import Packed
 from trajopt.study.store import Store
 
 SAMPLED = 3  # cases run first, to learn their time and columns
-SHORTEST_CHUNK, LONGEST_CHUNK = 0.25, 5.0  # s of work. chosen: a part costs some 10 ms, a crash costs a chunk
-_SHARE = 4  # a chunk is a quarter of what is left for its worker: large first, small at the end; chosen
+SHORTEST_CHUNK, LONGEST_CHUNK = (
+    0.25,
+    5.0,
+)  # s of work. chosen: a part costs some 10 ms, a crash costs a chunk
+_SHARE = (
+    4  # a chunk is a quarter of what is left for its worker: large first, small at the end; chosen
+)
 MOST_CASES = 10_000  # cases of one chunk, whatever their time; chosen
 _AHEAD = 2  # chunks in flight a worker, so that none waits for the submitter; chosen
 _STOP_GRACE = 20.0  # s that workers get to store what they have after a stop; chosen
@@ -57,7 +70,8 @@ class Setup:
 
 @dataclass(frozen=True)
 class Progress:
-    """State of a run: cases ``done`` by status in this run, ``total`` to do, ``seconds`` since the start."""
+    """State of a run: cases ``done`` by status in this run, ``total`` to do, ``seconds`` since the
+    start."""
 
     counts: Mapping[str, int]
     total: int
@@ -70,7 +84,9 @@ class Progress:
     @property
     def remaining_seconds(self) -> float | None:
         """Estimate from the rate so far; None before the first case."""
-        return (self.total - self.finished) * self.seconds / self.finished if self.finished else None
+        return (
+            (self.total - self.finished) * self.seconds / self.finished if self.finished else None
+        )
 
 
 @dataclass
@@ -116,15 +132,20 @@ class Drive:
                     rebuilds += 1
                     self._blame(flights)
                     context, executor = self._rebuilt(context, rebuilds)
-        except BaseException:  # Ctrl-C, a full disk: let the workers keep what they have, then pass it on
+        except (
+            BaseException
+        ):  # Ctrl-C, a full disk: let the workers keep what they have, then pass it on
             self._stop(flights, mark)
             raise
         finally:
-            with contextlib.suppress(Exception):  # of a cluster that lost processes: all that counts is stored
+            with contextlib.suppress(
+                Exception
+            ):  # of a cluster that lost processes: all that counts is stored
                 context.__exit__(None, None, None)
             mark.unlink(missing_ok=True)
 
-    # -- chunks ---------------------------------------------------------------------------------------
+    # -- chunks
+    # ---------------------------------------------------------------------------------------
 
     def _sample_first(self) -> None:
         """Bring a first, a middle and a last case to the front."""
@@ -172,10 +193,19 @@ class Drive:
 
     def _job(self, chunk: _Chunk) -> ChunkJob:
         cases, setup = self.table.take(chunk.places), self.setup
-        return ChunkJob(str(setup.store.path), chunk_name(cases), cases, setup.run, setup.limits, dict(self.kinds),
-                        setup.parameter_kinds, str(stop_mark(setup.store.path, setup.run_id)))
+        return ChunkJob(
+            str(setup.store.path),
+            chunk_name(cases),
+            cases,
+            setup.run,
+            setup.limits,
+            dict(self.kinds),
+            setup.parameter_kinds,
+            str(stop_mark(setup.store.path, setup.run_id)),
+        )
 
-    # -- outcomes -------------------------------------------------------------------------------------
+    # -- outcomes
+    # -------------------------------------------------------------------------------------
 
     def _collect(self, done: dict[Future[ChunkReport], _Chunk]) -> bool:
         """Take in finished chunks; True when the executor broke."""
@@ -188,7 +218,9 @@ class Drive:
                 self._died(chunk)
             except TrajoptError:
                 raise
-            except Exception as error:  # Dask's KilledWorker and its like: the task's worker is gone
+            except (
+                Exception
+            ) as error:  # Dask's KilledWorker and its like: the task's worker is gone
                 if not _is_death(error):
                     raise
                 self._died(chunk)
@@ -201,13 +233,18 @@ class Drive:
         for name, kind in outcome.kinds.items():
             self.kinds.setdefault(name, kind)
         finished = sum(outcome.counts.values())
-        if outcome.unfinished and not self.stopping:  # stopped from outside: what is left runs again
+        if (
+            outcome.unfinished and not self.stopping
+        ):  # stopped from outside: what is left runs again
             self.next_missing(chunk)
         if finished:
             first = self.seconds_a_case is None
             seconds = outcome.median_seconds if first else outcome.seconds / finished
-            self.seconds_a_case = seconds if first or self.seconds_a_case is None else (
-                0.5 * (self.seconds_a_case + seconds))
+            self.seconds_a_case = (
+                seconds
+                if first or self.seconds_a_case is None
+                else (0.5 * (self.seconds_a_case + seconds))
+            )
         self.report(Progress(dict(self.counts), len(self.places), time.monotonic() - self.started))
 
     def next_missing(self, chunk: _Chunk) -> None:
@@ -218,7 +255,8 @@ class Drive:
             self.retried.append(_Chunk(left))
 
     def _died(self, chunk: _Chunk) -> None:
-        """The worker of a chunk died: try again, then alone, then in halves, then record the one case."""
+        """The worker of a chunk died: try again, then alone, then in halves, then record the one
+        case."""
         chunk.deaths += 1
         if chunk.deaths <= RETRIES:
             self.retried.append(chunk)
@@ -227,7 +265,9 @@ class Drive:
         elif len(chunk.places) > 1:
             middle = len(chunk.places) // 2
             # Already suspected: each half runs alone once, and is halved again if its worker dies.
-            self.suspects.extend(_Chunk(half, RETRIES + 1) for half in (chunk.places[:middle], chunk.places[middle:]))
+            self.suspects.extend(
+                _Chunk(half, RETRIES + 1) for half in (chunk.places[:middle], chunk.places[middle:])
+            )
         elif chunk.deaths <= 2 * RETRIES + 1:
             self.suspects.append(chunk)
         else:
@@ -235,16 +275,30 @@ class Drive:
 
     def _record_guilty(self, chunk: _Chunk) -> None:
         cases = self.table.take(chunk.places)
-        row = Row(0, CRASHED, {}, {}, "WorkerDied", f"its worker died {chunk.deaths} times while running this case",
-                  "", time.time(), 0.0, chunk.deaths)
-        self.setup.store.write_part("parts", chunk_name(cases), row_table(
-            [row], cases, self.setup.parameter_kinds, self.kinds, "submitter"))
+        row = Row(
+            0,
+            CRASHED,
+            {},
+            {},
+            "WorkerDied",
+            f"its worker died {chunk.deaths} times while running this case",
+            "",
+            time.time(),
+            0.0,
+            chunk.deaths,
+        )
+        self.setup.store.write_part(
+            "parts",
+            chunk_name(cases),
+            row_table([row], cases, self.setup.parameter_kinds, self.kinds, "submitter"),
+        )
         self.counts[CRASHED] += 1
         if self.seconds_a_case is None:
             self.seconds_a_case = SHORTEST_CHUNK
 
     def _blame(self, flights: dict[Future[ChunkReport], _Chunk]) -> None:
-        """After a break: results that are there count, all other chunks in flight are under suspicion."""
+        """After a break: results that are there count, all other chunks in flight are under
+        suspicion."""
         wait(flights, timeout=5.0)
         self._collect({f: c for f, c in flights.items() if f.done()})
         for future, chunk in flights.items():
@@ -253,7 +307,8 @@ class Drive:
         flights.clear()
 
     def _started(self) -> tuple[AbstractContextManager[Executor], Executor]:
-        """A working executor. One whose workers cannot even start is no case's fault: raises WorkerStartError."""
+        """A working executor. One whose workers cannot even start is no case's fault: raises
+        WorkerStartError."""
         fault: BaseException | None = None
         for _ in range(self.engine.starts):
             context = self.engine.start()
@@ -261,12 +316,17 @@ class Drive:
                 executor = context.__enter__()
             except TrajoptError:
                 raise
-            except (Exception, CancelledError) as error:  # a cluster some of whose processes died while it started
+            except (
+                Exception,
+                CancelledError,
+            ) as error:  # a cluster some of whose processes died while it started
                 fault = error
                 continue
             try:
-                starts = [executor.submit(warm_up, self.setup.run, self.setup.limits.memory)
-                          for _ in range(self.engine.workers)]
+                starts = [
+                    executor.submit(warm_up, self.setup.run, self.setup.limits.memory)
+                    for _ in range(self.engine.workers)
+                ]
                 done, _ = wait(starts, return_when=FIRST_COMPLETED)
                 for start in done:
                     start.result()
@@ -276,19 +336,26 @@ class Drive:
                     context.__exit__(None, None, None)
                 if not isinstance(error, BrokenExecutor) and not _is_death(error):
                     raise
-        raise WorkerStartError(f"{self.engine.name}: workers died at {self.engine.starts} starts in a row, before any "
-                               "case; finished cases are kept; a script that runs a sweep needs "
-                               "`if __name__ == \"__main__\":` around what it does") from fault
+        raise WorkerStartError(
+            f"{self.engine.name}: workers died at {self.engine.starts} starts in a row, before any "
+            "case; finished cases are kept; a script that runs a sweep needs "
+            '`if __name__ == "__main__":` around what it does'
+        ) from fault
 
-    def _rebuilt(self, context: AbstractContextManager[Executor],
-                 rebuilds: int) -> tuple[AbstractContextManager[Executor], Executor]:
+    def _rebuilt(
+        self, context: AbstractContextManager[Executor], rebuilds: int
+    ) -> tuple[AbstractContextManager[Executor], Executor]:
         with contextlib.suppress(Exception):
             context.__exit__(None, None, None)
         if not self.engine.rebuilds or rebuilds > _MOST_REBUILDS:
-            raise BrokenExecutor(f"the executor ({self.engine.name}) broke and cannot be made anew; finished cases "
-                                 "are kept: run the sweep again, or give a factory instead of an executor")
+            raise BrokenExecutor(
+                f"the executor ({self.engine.name}) broke and cannot be made anew; finished cases "
+                "are kept: run the sweep again, or give a factory instead of an executor"
+            )
         if self.seconds_a_case is None and rebuilds > RETRIES:
-            self.seconds_a_case = SHORTEST_CHUNK  # the sampled cases kill their worker: go on with small chunks
+            self.seconds_a_case = (
+                SHORTEST_CHUNK  # the sampled cases kill their worker: go on with small chunks
+            )
         return self._started()
 
     def _stop(self, flights: dict[Future[ChunkReport], Any], mark: Path) -> None:
@@ -311,10 +378,18 @@ def chunk_name(cases: CaseTable) -> str:
 
 def sampled(table: CaseTable, count: int = SAMPLED) -> CaseTable:
     """First, middle and last cases of a table, for estimates."""
-    places = np.unique(np.linspace(0, len(table) - 1, min(count, len(table))).round().astype(np.int64))
+    places = np.unique(
+        np.linspace(0, len(table) - 1, min(count, len(table))).round().astype(np.int64)
+    )
     return table.take(places)
 
 
 def _is_death(error: BaseException) -> bool:
-    """Whether an error of a future says that the worker is gone (Dask; its classes are not imported here)."""
-    return type(error).__name__ in ("KilledWorker", "CancelledError", "FutureCancelledError", "CommClosedError")
+    """Whether an error of a future says that the worker is gone (Dask; its classes are not imported
+    here)."""
+    return type(error).__name__ in (
+        "KilledWorker",
+        "CancelledError",
+        "FutureCancelledError",
+        "CommClosedError",
+    )

@@ -1,7 +1,7 @@
 """Runs a chunk of cases in a child process and writes its part of the store.
 
-Every engine calls ``run_chunk``. A case that raises, exits, crashes, hangs, eats memory or prints without end
-costs its own row: the child dies, the host goes on with a new one.
+Every engine calls ``run_chunk``. A case that raises, exits, crashes, hangs, eats memory or prints
+without end costs its own row: the child dies, the host goes on with a new one.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ class RunLoadError(TrajoptError):
 
 @dataclass(frozen=True)
 class CaseLimits:
-    """What one case may use: wall-clock ``seconds`` and ``memory``, bytes of private data (0: unlimited)."""
+    """What one case may use: wall-clock ``seconds`` and ``memory``, bytes of private data (0:
+    unlimited)."""
 
     seconds: float
     memory: int
@@ -62,7 +63,8 @@ class CaseLimits:
 
 @dataclass(frozen=True)
 class ChunkJob:
-    """A chunk of cases for a worker: everything it needs to know. ``stop_mark``: file whose presence says stop."""
+    """A chunk of cases for a worker: everything it needs to know. ``stop_mark``: file whose
+    presence says stop."""
 
     store: str
     name: str
@@ -76,7 +78,8 @@ class ChunkJob:
 
 @dataclass(frozen=True)
 class ChunkReport:
-    """What became of a chunk: cases by status, how many were left, median and total case time, s."""
+    """What became of a chunk: cases by status, how many were left, median and total case time,
+    s."""
 
     counts: Mapping[str, int]
     unfinished: int
@@ -86,9 +89,11 @@ class ChunkReport:
 
 
 def run_chunk(job: ChunkJob, should_stop: Callable[[], bool] | None = None) -> ChunkReport:
-    """Run the cases of a chunk and store their rows; stops early, keeping what is finished, when told to.
+    """Run the cases of a chunk and store their rows; stops early, keeping what is finished, when
+    told to.
 
-    Raises StoreError when the store cannot be written, RunLoadError when the run function cannot be loaded.
+    Raises StoreError when the store cannot be written, RunLoadError when the run function cannot be
+    loaded.
     """
     clock = time.perf_counter()
     rows = _rows_of(job, should_stop or _StopMark(job.stop_mark))
@@ -102,8 +107,13 @@ def run_chunk(job: ChunkJob, should_stop: Callable[[], bool] | None = None) -> C
         table = row_table(rows, job.cases, job.parameter_kinds, kinds, socket.gethostname())
         store.write_part("parts", job.name, table)
     times = sorted(r.seconds for r in rows)
-    return ChunkReport(Counter(r.status for r in rows), len(job.cases) - len(rows),
-                       times[len(times) // 2] if times else 0.0, time.perf_counter() - clock, kinds)
+    return ChunkReport(
+        Counter(r.status for r in rows),
+        len(job.cases) - len(rows),
+        times[len(times) // 2] if times else 0.0,
+        time.perf_counter() - clock,
+        kinds,
+    )
 
 
 def parameter_kinds(cases: CaseTable) -> dict[str, Kind]:
@@ -113,7 +123,8 @@ def parameter_kinds(cases: CaseTable) -> dict[str, Kind]:
 
 @dataclass
 class _StopMark:
-    """Whether to stop: the mark exists, or the process that started this one is gone. Looks a few times a second."""
+    """Whether to stop: the mark exists, or the process that started this one is gone. Looks a few
+    times a second."""
 
     mark: str | None
     parent: int = field(default_factory=os.getppid)
@@ -124,7 +135,9 @@ class _StopMark:
         now = time.monotonic()
         if not self.stop and now - self.looked > POLL:
             self.looked = now
-            self.stop = (self.mark is not None and os.path.exists(self.mark)) or os.getppid() != self.parent
+            self.stop = (
+                self.mark is not None and os.path.exists(self.mark)
+            ) or os.getppid() != self.parent
         return self.stop
 
 
@@ -135,21 +148,40 @@ def _rows_of(job: ChunkJob, should_stop: Callable[[], bool]) -> list[Row]:
     todo = list(range(len(cases)))
     while todo and not should_stop():
         child = _child_for(job.run, job.limits.memory)
-        death = child.work([(i, cases[i].id, dict(cases[i].values)) for i in todo], rows, job.limits.seconds,
-                           should_stop)
+        death = child.work(
+            [(i, cases[i].id, dict(cases[i].values)) for i in todo],
+            rows,
+            job.limits.seconds,
+            should_stop,
+        )
         todo = [i for i in todo if i not in rows]
         if death is None:
             continue
         deaths[death.index] += 1
         if death.index in rows or death.index < 0:  # between cases: nobody's fault
             if deaths[death.index] > _IDLE_DEATHS:
-                raise RunLoadError(f"worker processes keep dying between cases: {death.reason}\n{death.output}")
+                raise RunLoadError(
+                    f"worker processes keep dying between cases: {death.reason}\n{death.output}"
+                )
             continue
         if death.status == TIMEOUT or deaths[death.index] > RETRIES:
-            rows[death.index] = Row(death.index, death.status, {}, {}, death.error, death.reason, death.output,
-                                    time.time() - death.seconds, death.seconds, deaths[death.index])
+            rows[death.index] = Row(
+                death.index,
+                death.status,
+                {},
+                {},
+                death.error,
+                death.reason,
+                death.output,
+                time.time() - death.seconds,
+                death.seconds,
+                deaths[death.index],
+            )
         todo = [i for i in todo if i not in rows]
-    return [row._replace(attempts=deaths[i] + (row.status not in (CRASHED, TIMEOUT))) for i, row in rows.items()]
+    return [
+        row._replace(attempts=deaths[i] + (row.status not in (CRASHED, TIMEOUT)))
+        for i, row in rows.items()
+    ]
 
 
 @dataclass(frozen=True)
@@ -177,20 +209,35 @@ class _Child:
         self.progress = mmap.mmap(self.shared.fileno(), PROGRESS.size)
         note_progress(self.progress, -1)
         handles = (theirs.fileno(), self.shared.fileno())
-        program = (f"import sys; sys.path[:] = {list(run.path)!r}; from trajopt.study.child import main; "
-                   f"main({handles[0]}, {handles[1]}, {os.getpid()}, {memory})")
+        program = (
+            f"import sys; sys.path[:] = {list(run.path)!r}; from trajopt.study.child import main; "
+            f"main({handles[0]}, {handles[1]}, {os.getpid()}, {memory})"
+        )
         self.process = subprocess.Popen(
-            [sys.executable, "-c", program], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, pass_fds=handles, bufsize=0,
-            env={**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")})
+            [sys.executable, "-c", program],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            pass_fds=handles,
+            bufsize=0,
+            env={**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")},
+        )
         theirs.close()
         self.ready = False
-        with contextlib.suppress(OSError):  # a child that is already dead is found when it is waited for
+        with contextlib.suppress(
+            OSError
+        ):  # a child that is already dead is found when it is waited for
             ours.send_bytes(pickle.dumps(run))
 
-    def work(self, cases: list[tuple[int, str, dict[str, Any]]], rows: dict[int, Row], limit: float,
-             should_stop: Callable[[], bool]) -> _Death | None:
-        """Run cases, adding to ``rows``; the child's death, or None when finished or told to stop."""
+    def work(
+        self,
+        cases: list[tuple[int, str, dict[str, Any]]],
+        rows: dict[int, Row],
+        limit: float,
+        should_stop: Callable[[], bool],
+    ) -> _Death | None:
+        """Run cases, adding to ``rows``; the child's death, or None when finished or told to
+        stop."""
         try:
             if not self.ready:
                 if not self._until("ready", rows, limit, should_stop):
@@ -206,9 +253,13 @@ class _Child:
         except _Overdue as error:
             index, started = noted_progress(self.progress)
             self.close()
-            return _Death(index, TIMEOUT, "TimeLimit", str(error), self._text(), time.monotonic() - started)
+            return _Death(
+                index, TIMEOUT, "TimeLimit", str(error), self._text(), time.monotonic() - started
+            )
 
-    def _until(self, what: str, rows: dict[int, Row], limit: float, should_stop: Callable[[], bool]) -> bool:
+    def _until(
+        self, what: str, rows: dict[int, Row], limit: float, should_stop: Callable[[], bool]
+    ) -> bool:
         """Read messages until one says ``what``; False when told to stop before."""
         assert self.process.stdout is not None
         sources: list[Any] = [self.connection, self.process.stdout]
@@ -219,7 +270,9 @@ class _Child:
                     if message[0] == "rows":
                         rows.update((r[0], Row(*r)) for r in message[1])
                     elif message[0] == "unloadable":
-                        raise RunLoadError(f"the run function cannot be loaded: {message[1]}\n{message[2]}")
+                        raise RunLoadError(
+                            f"the run function cannot be loaded: {message[1]}\n{message[2]}"
+                        )
                     elif message[0] == what:
                         return True
                 else:
@@ -244,8 +297,14 @@ class _Child:
                 while data := os.read(self.process.stdout.fileno(), 1 << 16):
                     self.output = (self.output + data)[-_TAIL:]
         self.close()
-        return _Death(index, CRASHED, "WorkerDied", _why(code), self._text(),
-                      max(0.0, time.monotonic() - started) if index >= 0 else 0.0)
+        return _Death(
+            index,
+            CRASHED,
+            "WorkerDied",
+            _why(code),
+            self._text(),
+            max(0.0, time.monotonic() - started) if index >= 0 else 0.0,
+        )
 
     def _text(self) -> str:
         return self.output.decode(errors="replace")
@@ -274,7 +333,8 @@ _thread = threading.local()  # the child of this thread: starting one costs 0.2 
 
 
 def warm_up(run: Packed, memory: int) -> None:
-    """Start this thread's child, so that all workers start theirs at the same time, before any case waits.
+    """Start this thread's child, so that all workers start theirs at the same time, before any case
+    waits.
 
     Raises RunLoadError. A child that dies here is no matter: the first chunk starts another.
     """
@@ -302,7 +362,8 @@ def end_child() -> None:
 
 
 def default_memory() -> int:
-    """Bytes a case may use: nine tenths of the machine's memory, shared by its processors; chosen."""
+    """Bytes a case may use: nine tenths of the machine's memory, shared by its processors;
+    chosen."""
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return int(0.9 * total / (os.cpu_count() or 1))
 

@@ -12,7 +12,8 @@ from trajopt.study.rows import DONE, arrow
 
 
 def united(tables: Sequence[Any]) -> Any:
-    """All rows in one table; a column that a table lacks is null there, one of different kinds becomes text."""
+    """All rows in one table; a column that a table lacks is null there, one of different kinds
+    becomes text."""
     pa = arrow()
     try:
         return pa.concat_tables(tables, promote_options="permissive")
@@ -22,8 +23,8 @@ def united(tables: Sequence[Any]) -> Any:
 
 
 def common_schema(schemas: Iterable[Any]) -> Any:
-    """Schema that rows of all the given ones fit into: whole numbers beside others widen, kinds that exclude each
-    other become text."""
+    """Schema that rows of all the given ones fit into: whole numbers beside others widen, kinds
+    that exclude each other become text."""
     pa = arrow()
     fields: dict[str, Any] = {}
     for schema in schemas:
@@ -32,7 +33,9 @@ def common_schema(schemas: Iterable[Any]) -> Any:
             known = fields.setdefault(field.name, plain)
             if known.type != field.type:
                 try:
-                    merged = pa.unify_schemas([pa.schema([known]), pa.schema([plain])], promote_options="permissive")
+                    merged = pa.unify_schemas(
+                        [pa.schema([known]), pa.schema([plain])], promote_options="permissive"
+                    )
                     fields[field.name] = merged.field(0)
                 except (pa.ArrowTypeError, pa.ArrowInvalid):
                     fields[field.name] = pa.field(field.name, pa.string())
@@ -40,7 +43,8 @@ def common_schema(schemas: Iterable[Any]) -> Any:
 
 
 def conformed(table: Any, schema: Any) -> Any:
-    """The table with exactly the columns and types of ``schema``, which holds all of its columns."""
+    """The table with exactly the columns and types of ``schema``, which holds all of its
+    columns."""
     pa = arrow()
     columns = []
     for field in schema:
@@ -59,7 +63,9 @@ def one_row_a_case(table: Any) -> Any:
     if len(table) == 0:
         return table
     compute = arrow().compute
-    keys = arrow().table({"case": table["case"], "failed": compute.not_equal(table["status"], DONE)})
+    keys = arrow().table(
+        {"case": table["case"], "failed": compute.not_equal(table["status"], DONE)}
+    )
     order = [("case", "ascending"), ("failed", "ascending")]
     if "run_started" in table.column_names:
         keys = keys.append_column("started", table["run_started"])

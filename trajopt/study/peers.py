@@ -1,7 +1,7 @@
 """PSO of other packages behind the package's contract, for the benchmark only: pyswarms and pymoo.
 
-Their random numbers: pyswarms draws from NumPy's global state, which is set from the generator given and put
-back afterwards; pymoo takes a seed.
+Their random numbers: pyswarms draws from NumPy's global state, which is set from the generator
+given and put back afterwards; pymoo takes a seed.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _FOREVER = 1_000_000  # iterations; the run's budget ends searches before
 class PySwarms:
     """pyswarms's GlobalBestPSO with its documentation's options.
 
-    ``constriction``: the coefficients of our gbest PSO instead. ``equal``: also a start at rest and positions
-    mirrored at the bounds; ``ParticleSwarm(boundary="mirror")`` is its equal.
+    ``constriction``: the coefficients of our gbest PSO instead. ``equal``: also a start at rest and
+    positions mirrored at the bounds; ``ParticleSwarm(boundary="mirror")`` is its equal.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
@@ -45,8 +45,16 @@ class PySwarms:
     def name(self) -> str:
         return "pyswarms"
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,  # noqa: ARG002
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,  # noqa: ARG002
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
         """Search; pyswarms knows no start and no constraints (ArgumentError)."""
         box = _only_bounds(self.name, objective, bounds)
         run = Run(objective, box, budget, progress)
@@ -61,11 +69,18 @@ class PySwarms:
         before = np.random.get_state()  # noqa: NPY002 - the only generator pyswarms knows
         np.random.seed(int(rng.integers(2**31)))  # noqa: NPY002
         try:
-            swarm = GlobalBestPSO(self.particles, len(run.bounds), options, bounds=tuple(run.bounds.T),
-                                  bh_strategy="reflective" if self.equal else "periodic")  # periodic is its default
+            swarm = GlobalBestPSO(
+                self.particles,
+                len(run.bounds),
+                options,
+                bounds=tuple(run.bounds.T),
+                bh_strategy="reflective" if self.equal else "periodic",
+            )  # periodic is its default
             if self.equal:
                 swarm.swarm.velocity = np.zeros_like(swarm.swarm.velocity)
-            swarm.optimize(lambda x: np.minimum(run.evaluate(x).cost, _LARGE), _FOREVER, verbose=False)
+            swarm.optimize(
+                lambda x: np.minimum(run.evaluate(x).cost, _LARGE), _FOREVER, verbose=False
+            )
         finally:
             np.random.set_state(before)  # noqa: NPY002
         return Status.CONVERGED, "all iterations done"
@@ -81,8 +96,16 @@ class Pymoo:
 
     particles: int = 50
 
-    def minimize(self, objective: Objective, bounds: ArrayLike, *, x0: ArrayLike | None = None,  # noqa: ARG002
-                 rng: Generator, budget: Budget, progress: Progress | None = None) -> OptimizeResult:
+    def minimize(
+        self,
+        objective: Objective,
+        bounds: ArrayLike,
+        *,
+        x0: ArrayLike | None = None,  # noqa: ARG002
+        rng: Generator,
+        budget: Budget,
+        progress: Progress | None = None,
+    ) -> OptimizeResult:
         """Search; constraints are not passed on (ArgumentError)."""
         box = _only_bounds(self.name, objective, bounds)
         run = Run(objective, box, budget, progress)
@@ -101,13 +124,20 @@ class Pymoo:
                 out["F"] = np.minimum(run.evaluate(x).cost, _LARGE)[:, None]
 
         problem = Asked(n_var=len(run.bounds), n_obj=1, xl=run.bounds[:, 0], xu=run.bounds[:, 1])
-        minimize(problem, PSO(pop_size=self.particles), ("n_gen", _FOREVER), seed=int(rng.integers(2**31)))
+        minimize(
+            problem,
+            PSO(pop_size=self.particles),
+            ("n_gen", _FOREVER),
+            seed=int(rng.integers(2**31)),
+        )
         return Status.CONVERGED, "pymoo's stopping rule is met"
 
 
 def _only_bounds(name: str, objective: Objective, bounds: ArrayLike) -> Array:
     if objective.constrained:
-        raise ArgumentError("optimizer", name, "a method that handles constraints for this objective: pso")
+        raise ArgumentError(
+            "optimizer", name, "a method that handles constraints for this objective: pso"
+        )
     return checked_bounds(bounds, objective.dimension)
 
 

@@ -1,4 +1,5 @@
-"""The run function of sweeps over problem files: change the problem, solve it, and drive it where asked."""
+"""The run function of sweeps over problem files: change the problem, solve it, and drive it where
+asked."""
 
 from __future__ import annotations
 
@@ -23,8 +24,8 @@ ENGINES = ("none", "pybullet", "mujoco")
 
 @dataclass(frozen=True)
 class SolveOptions:
-    """How problems are solved: ``optimizer``, budget in ``evaluations`` (0: the default), and the physics
-    ``engine`` that drives the result ("none": it is not driven)."""
+    """How problems are solved: ``optimizer``, budget in ``evaluations`` (0: the default), and the
+    physics ``engine`` that drives the result ("none": it is not driven)."""
 
     optimizer: str = "auto"
     evaluations: int = 0
@@ -41,8 +42,9 @@ class SolveOptions:
 class ProblemRun:
     """Solves ``problem`` with a case's values put in.
 
-    Names with a dot are keys of the problem, except ``run.optimizer``, ``run.seed``, ``run.engine`` and
-    ``run.evaluations``; without ``run.seed`` the case's own seed is used. Names without a dot are left alone.
+    Names with a dot are keys of the problem, except ``run.optimizer``, ``run.seed``, ``run.engine``
+    and ``run.evaluations``; without ``run.seed`` the case's own seed is used. Names without a dot
+    are left alone.
     """
 
     problem: Problem
@@ -51,18 +53,29 @@ class ProblemRun:
     def __call__(self, case: Case) -> dict[str, Any]:
         solution = self.solution(case)
         row: dict[str, Any] = {
-            "cost": solution.cost, "terms": solution.terms, "evaluations": solution.evaluations,
-            "holds": solution.holds, "faults": "; ".join(solution.faults), "search": solution.search.status,
-            "margins": solution.margins, "pose_error": np.asarray(solution.deviation).tolist(),
-            "wheel_error": np.asarray(solution.wheel_deviation).tolist(), "control_points": solution.control_points,
+            "cost": solution.cost,
+            "terms": solution.terms,
+            "evaluations": solution.evaluations,
+            "holds": solution.holds,
+            "faults": "; ".join(solution.faults),
+            "search": solution.search.status,
+            "margins": solution.margins,
+            "pose_error": np.asarray(solution.deviation).tolist(),
+            "wheel_error": np.asarray(solution.wheel_deviation).tolist(),
+            "control_points": solution.control_points,
         }
         if solution.trajectory is not None:
             row["duration"] = solution.trajectory.duration
         report = self.driven(case, solution)
         if report is not None:
-            row["driven"] = {"along": report.along, "across": report.across, "yaw": report.yaw,
-                             "wheel_error": np.asarray(report.wheel_deviation).tolist(),
-                             "path_rms": report.path_rms, "path_max": report.path_max}
+            row["driven"] = {
+                "along": report.along,
+                "across": report.across,
+                "yaw": report.yaw,
+                "wheel_error": np.asarray(report.wheel_deviation).tolist(),
+                "path_rms": report.path_rms,
+                "path_max": report.path_max,
+            }
             row["driven_pose"] = report.recording.pose
             row["driven_times"] = report.recording.times
         return row
@@ -77,12 +90,16 @@ class ProblemRun:
         from trajopt.pipeline import solve
 
         evaluations = int(case.values.get("run.evaluations", self.options.evaluations))
-        return solve(self.problem.replace(changes(case.values)), seed=self.seed(case),
-                     optimizer=str(case.values.get("run.optimizer", self.options.optimizer)),
-                     budget=Budget(evaluations=evaluations) if evaluations else None)
+        return solve(
+            self.problem.replace(changes(case.values)),
+            seed=self.seed(case),
+            optimizer=str(case.values.get("run.optimizer", self.options.optimizer)),
+            budget=Budget(evaluations=evaluations) if evaluations else None,
+        )
 
     def driven(self, case: Case, solution: Solution) -> ValidationReport | None:
-        """The solution in physics; None where the case has no engine, or the solution no trajectory."""
+        """The solution in physics; None where the case has no engine, or the solution no
+        trajectory."""
         from trajopt.pipeline import validate
 
         engine = str(case.values.get("run.engine", self.options.engine))

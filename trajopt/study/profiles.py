@@ -1,7 +1,8 @@
 """Profiles of a benchmark: data and performance profiles, ECDF of targets, expected running time.
 
-Input throughout is a table of running times ``times`` (problems, optimizers, seeds[, targets]): what a search
-had used when it reached its target, inf where it did not. The unit (evaluations, seconds) is the caller's.
+Input throughout is a table of running times ``times`` (problems, optimizers, seeds[, targets]):
+what a search had used when it reached its target, inf where it did not. The unit (evaluations,
+seconds) is the caller's.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ Array = NDArray[np.float64]
 
 
 def time_to_targets(used: ArrayLike, cost: ArrayLike, targets: ArrayLike) -> Array:
-    """(t,): what a search had used when its best cost first was at or below each target, inf where never.
+    """(t,): what a search had used when its best cost first was at or below each target, inf where
+    never.
 
     ``used`` (h,) and ``cost`` (h,) are a history of improvements; ``cost`` falls.
     """
@@ -30,20 +32,22 @@ def time_to_targets(used: ArrayLike, cost: ArrayLike, targets: ArrayLike) -> Arr
 
 
 def data_profile(times: ArrayLike, dimension: ArrayLike, budget: ArrayLike) -> Array:
-    """(k, optimizers): share of (problem, seed) pairs solved within ``budget`` (k,) simplex gradients.
+    """(k, optimizers): share of (problem, seed) pairs solved within ``budget`` (k,) simplex
+    gradients.
 
-    Moré and Wild 2009, eq. 2.3: evaluations divided by dimension + 1. ``times`` (p, o, s), NaN where a
-    run does not exist.
+    Moré and Wild 2009, eq. 2.3: evaluations divided by dimension + 1. ``times`` (p, o, s), NaN
+    where a run does not exist.
     """
     scaled = _three(times) / (np.asarray(dimension, dtype=np.float64)[:, None, None] + 1.0)
     return np.stack([_share(scaled <= b, scaled) for b in np.atleast_1d(budget)])
 
 
 def performance_profile(times: ArrayLike, ratio: ArrayLike) -> Array:
-    """(k, optimizers): share of problems solved within ``ratio`` (k,) times the best optimizer's time.
+    """(k, optimizers): share of problems solved within ``ratio`` (k,) times the best optimizer's
+    time.
 
-    Dolan and Moré 2002, on the median over seeds of each problem and optimizer. Problems that nobody solved
-    count as unsolved by all.
+    Dolan and Moré 2002, on the median over seeds of each problem and optimizer. Problems that
+    nobody solved count as unsolved by all.
     """
     table = _three(times)
     present = ~np.isnan(table).all(axis=2)
@@ -58,7 +62,8 @@ def performance_profile(times: ArrayLike, ratio: ArrayLike) -> Array:
 
 
 def ecdf(times: ArrayLike, budget: ArrayLike) -> Array:
-    """(k, optimizers): share of all (problem, seed, target) triples reached within ``budget`` (k,), as in COCO.
+    """(k, optimizers): share of all (problem, seed, target) triples reached within ``budget`` (k,),
+    as in COCO.
 
     ``times`` (p, o, s, t).
     """
@@ -73,7 +78,8 @@ def ecdf(times: ArrayLike, budget: ArrayLike) -> Array:
 class RunningTime:
     """Expected running time until a target: total time of all runs over the number of successes.
 
-    ``low`` and ``high`` bound it with 95 % confidence (bootstrap); inf where no run, or too few, succeeded.
+    ``low`` and ``high`` bound it with 95 % confidence (bootstrap); inf where no run, or too few,
+    succeeded.
     """
 
     value: float
@@ -83,14 +89,19 @@ class RunningTime:
     runs: int
 
 
-def expected_running_time(times: ArrayLike, used: ArrayLike, rng: Generator, draws: int = 1000) -> RunningTime:
-    """ERT of one optimizer on one problem (Hansen et al. 2009, eq. 3) with a percentile bootstrap over runs.
+def expected_running_time(
+    times: ArrayLike, used: ArrayLike, rng: Generator, draws: int = 1000
+) -> RunningTime:
+    """ERT of one optimizer on one problem (Hansen et al. 2009, eq. 3) with a percentile bootstrap
+    over runs.
 
     ``times`` (s,): time to the target, inf for failures. ``used`` (s,): what each run used in all.
     """
     times, used = np.asarray(times, dtype=np.float64), np.asarray(used, dtype=np.float64)
     if times.ndim != 1 or times.shape != used.shape or not len(times):
-        raise ArgumentError("times", times.shape, "one time a run, at least one, and as many entries in used")
+        raise ArgumentError(
+            "times", times.shape, "one time a run, at least one, and as many entries in used"
+        )
     spent, success = np.where(np.isfinite(times), times, used), np.isfinite(times)
     picks = rng.integers(len(times), size=(draws, len(times)))
     wins = success[picks].sum(axis=1)
@@ -104,7 +115,8 @@ def expected_running_time(times: ArrayLike, used: ArrayLike, rng: Generator, dra
 def no_worse(first: ArrayLike, second: ArrayLike) -> float:
     """p-value of the one-sided rank-sum test that ``first`` has larger costs than ``second``.
 
-    A small value (below 0.05, say) means that ``first`` is worse. Ties are handled by the normal approximation.
+    A small value (below 0.05, say) means that ``first`` is worse. Ties are handled by the normal
+    approximation.
     """
     from scipy.stats import mannwhitneyu
 
@@ -135,7 +147,8 @@ def _median(values: Array) -> float:
 
 
 def _share(hit: NDArray[np.bool_], table: Array) -> Array:
-    """(optimizers,): mean of ``hit`` over everything else, where the table is not NaN; NaN without entries."""
+    """(optimizers,): mean of ``hit`` over everything else, where the table is not NaN; NaN without
+    entries."""
     present = ~np.isnan(table)
     axes = tuple(i for i in range(table.ndim) if i != 1)
     count = present.sum(axis=axes)

@@ -18,11 +18,14 @@ Kind = Literal["number", "integer", "flag", "text", "numbers", "json"]
 DONE, ERROR, TIMEOUT, CRASHED = "done", "error", "timeout", "crashed"
 RUN_COLUMNS = ("run_started", "run_seconds", "run_host", "run_attempts", "error_traceback")
 FIXED_COLUMNS = ("case", "status", "case_seed", "error", "error_message", *RUN_COLUMNS)
-_LONGEST = 1_000  # numbers in a list that may stay a table cell; longer ones belong into an array. chosen
+_LONGEST = (
+    1_000  # numbers in a list that may stay a table cell; longer ones belong into an array. chosen
+)
 
 
 class Row(NamedTuple):
-    """One finished case: ``place`` in its chunk, ``status``, flat ``results``, ``arrays`` kept beside the table."""
+    """One finished case: ``place`` in its chunk, ``status``, flat ``results``, ``arrays`` kept
+    beside the table."""
 
     place: int
     status: str
@@ -39,8 +42,8 @@ class Row(NamedTuple):
 def results_of(returned: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     """Table cells and arrays in what a run function returned: a mapping, a number, or None.
 
-    Nested mappings become dotted names, enums their names, NumPy arrays of one dimension or more go beside the
-    table. Raises ArgumentError, naming the key, for what no table can hold.
+    Nested mappings become dotted names, enums their names, NumPy arrays of one dimension or more go
+    beside the table. Raises ArgumentError, naming the key, for what no table can hold.
     """
     if returned is None:
         return {}, {}
@@ -52,7 +55,9 @@ def results_of(returned: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     return cells, arrays
 
 
-def _flatten(prefix: str, values: Mapping[Any, Any], cells: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> None:
+def _flatten(
+    prefix: str, values: Mapping[Any, Any], cells: dict[str, Any], arrays: dict[str, NDArray[Any]]
+) -> None:
     for key, value in values.items():
         if not isinstance(key, str):
             raise ArgumentError("result key", key, "a text")
@@ -77,11 +82,18 @@ def _cell(name: str, value: Any) -> Any:
         return value
     if isinstance(value, (int, float)):
         return float(value)  # one kind for all numbers, so that parts of a sweep never disagree
-    if isinstance(value, (list, tuple)) and len(value) <= _LONGEST and all(
-            isinstance(v, (int, float, np.number)) and not isinstance(v, bool) for v in value):
+    if (
+        isinstance(value, (list, tuple))
+        and len(value) <= _LONGEST
+        and all(isinstance(v, (int, float, np.number)) and not isinstance(v, bool) for v in value)
+    ):
         return [float(v) for v in value]
-    raise ArgumentError(f"result '{name}'", type(value), "a number, text, boolean, None, short list of numbers, NumPy "
-                                                   "array of numbers, or a mapping of those")
+    raise ArgumentError(
+        f"result '{name}'",
+        type(value),
+        "a number, text, boolean, None, short list of numbers, NumPy "
+        "array of numbers, or a mapping of those",
+    )
 
 
 def kind_of(value: Any) -> Kind | None:
@@ -100,7 +112,8 @@ def kind_of(value: Any) -> Kind | None:
 
 
 def result_kinds(rows: Sequence[Row], known: Mapping[str, Kind]) -> dict[str, Kind]:
-    """Kinds of all result columns: the known ones first, then what these rows bring, by their first value."""
+    """Kinds of all result columns: the known ones first, then what these rows bring, by their first
+    value."""
     kinds = dict(known)
     for row in rows:
         for name, value in row.results.items():
@@ -110,14 +123,20 @@ def result_kinds(rows: Sequence[Row], known: Mapping[str, Kind]) -> dict[str, Ki
 
 
 def fitted(rows: Sequence[Row], kinds: Mapping[str, Kind]) -> list[Row]:
-    """Rows whose cells fit the kinds; a cell of another kind turns its row into an error that says so."""
+    """Rows whose cells fit the kinds; a cell of another kind turns its row into an error that says
+    so."""
     result = []
     for row in rows:
         for name, value in row.results.items():
             kind = kind_of(value)
             if kind is not None and kind != kinds[name]:
-                row = row._replace(status=ERROR, results={}, arrays={}, error="ResultKindError",
-                                   message=f"result '{name}' is {value!r} here, but a {kinds[name]} in other cases")
+                row = row._replace(
+                    status=ERROR,
+                    results={},
+                    arrays={},
+                    error="ResultKindError",
+                    message=f"result '{name}' is {value!r} here, but a {kinds[name]} in other cases",
+                )
                 break
         result.append(row)
     return result
@@ -135,7 +154,9 @@ def parameter_kind(column: NDArray[Any]) -> Kind:
     types = {type(v) for v in column.tolist()} - {type(None)}
     if types == {str}:
         return "text"
-    if types == {list} and all(type(x) in (int, float) for v in column.tolist() if v is not None for x in v):
+    if types == {list} and all(
+        type(x) in (int, float) for v in column.tolist() if v is not None for x in v
+    ):
         return "numbers"
     return "json"
 
@@ -152,13 +173,25 @@ def arrow() -> Any:
 
 def arrow_type(kind: Kind) -> Any:
     pa = arrow()
-    return {"number": pa.float64(), "integer": pa.int64(), "flag": pa.bool_(), "text": pa.string(),
-            "numbers": pa.list_(pa.float64()), "json": pa.string()}[kind]
+    return {
+        "number": pa.float64(),
+        "integer": pa.int64(),
+        "flag": pa.bool_(),
+        "text": pa.string(),
+        "numbers": pa.list_(pa.float64()),
+        "json": pa.string(),
+    }[kind]
 
 
-def row_table(rows: Sequence[Row], cases: CaseTable, parameter_kinds: Mapping[str, Kind],
-              kinds: Mapping[str, Kind], host: str) -> Any:
-    """Arrow table of rows: fixed columns, case values, results; ``row.place`` points into ``cases``."""
+def row_table(
+    rows: Sequence[Row],
+    cases: CaseTable,
+    parameter_kinds: Mapping[str, Kind],
+    kinds: Mapping[str, Kind],
+    host: str,
+) -> Any:
+    """Arrow table of rows: fixed columns, case values, results; ``row.place`` points into
+    ``cases``."""
     pa = arrow()
     places = np.array([r.place for r in rows], dtype=np.int64)
     picked = cases.take(places)
@@ -178,10 +211,17 @@ def row_table(rows: Sequence[Row], cases: CaseTable, parameter_kinds: Mapping[st
     for name in sorted(kinds):
         column_name = name if name not in data and name not in FIXED_COLUMNS else f"result.{name}"
         data[column_name] = pa.array([r.results.get(name) for r in rows], arrow_type(kinds[name]))
-    for column_name, texts in (("error", [r.error for r in rows]), ("error_message", [r.message for r in rows]),
-                               ("error_traceback", [r.traceback for r in rows])):
-        data[column_name] = pa.array([t if f else None for t, f in zip(texts, failed, strict=True)], pa.string())
-    data["run_started"] = pa.array([round(r.started * 1e6) for r in rows], pa.timestamp("us", tz="UTC"))
+    for column_name, texts in (
+        ("error", [r.error for r in rows]),
+        ("error_message", [r.message for r in rows]),
+        ("error_traceback", [r.traceback for r in rows]),
+    ):
+        data[column_name] = pa.array(
+            [t if f else None for t, f in zip(texts, failed, strict=True)], pa.string()
+        )
+    data["run_started"] = pa.array(
+        [round(r.started * 1e6) for r in rows], pa.timestamp("us", tz="UTC")
+    )
     data["run_seconds"] = pa.array([r.seconds for r in rows], pa.float64())
     data["run_host"] = pa.array([host] * len(rows), pa.string())
     data["run_attempts"] = pa.array([r.attempts for r in rows], pa.int32())
@@ -189,14 +229,21 @@ def row_table(rows: Sequence[Row], cases: CaseTable, parameter_kinds: Mapping[st
 
 
 def array_table(rows: Sequence[Row], cases: CaseTable) -> Any:
-    """Arrow table of the arrays beside the rows: case, name, shape, values (row-major, float64); None if none."""
+    """Arrow table of the arrays beside the rows: case, name, shape, values (row-major, float64);
+    None if none."""
     pa = arrow()
-    found = [(cases.ids[r.place].decode(), name, array) for r in rows for name, array in r.arrays.items()]
+    found = [
+        (cases.ids[r.place].decode(), name, array) for r in rows for name, array in r.arrays.items()
+    ]
     if not found:
         return None
-    return pa.table({
-        "case": pa.array([f[0] for f in found], pa.string()),
-        "name": pa.array([f[1] for f in found], pa.string()),
-        "shape": pa.array([list(f[2].shape) for f in found], pa.list_(pa.int32())),
-        "values": pa.array([np.asarray(f[2], dtype=np.float64).ravel() for f in found], pa.list_(pa.float64())),
-    })
+    return pa.table(
+        {
+            "case": pa.array([f[0] for f in found], pa.string()),
+            "name": pa.array([f[1] for f in found], pa.string()),
+            "shape": pa.array([list(f[2].shape) for f in found], pa.list_(pa.int32())),
+            "values": pa.array(
+                [np.asarray(f[2], dtype=np.float64).ravel() for f in found], pa.list_(pa.float64())
+            ),
+        }
+    )

@@ -1,4 +1,5 @@
-"""A run function in a form that any process can load: pickled, with the module search path it needs."""
+"""A run function in a form that any process can load: pickled, with the module search path it
+needs."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ RunFunction = Callable[[Any], Any]  # Case -> mapping of names to results, a num
 
 @dataclass(frozen=True)
 class Packed:
-    """A run function as bytes. ``main`` is the script it comes from, ``path`` the module search path."""
+    """A run function as bytes. ``main`` is the script it comes from, ``path`` the module search
+    path."""
 
     data: bytes
     path: tuple[str, ...]
@@ -26,7 +28,9 @@ class Packed:
 
     @property
     def key(self) -> str:
-        return hashlib.blake2b(self.data + repr((self.path, self.main)).encode(), digest_size=8).hexdigest()
+        return hashlib.blake2b(
+            self.data + repr((self.path, self.main)).encode(), digest_size=8
+        ).hexdigest()
 
 
 def packed(run: RunFunction) -> Packed:
@@ -55,7 +59,8 @@ def unpacked(run: Packed) -> RunFunction:
 
 
 def name_of(run: RunFunction) -> str:
-    """Name that goes into identities: module and qualified name, of the class for a callable object."""
+    """Name that goes into identities: module and qualified name, of the class for a callable
+    object."""
     function = getattr(run, "func", run)  # functools.partial
     named = function if hasattr(function, "__qualname__") else type(function)
     module = _module_of(run)
@@ -68,10 +73,13 @@ def _module_of(run: RunFunction) -> str:
 
 
 def _by_value(run: RunFunction, error: Exception) -> bytes:
-    """Lambdas and functions of an interpreter, by value, where cloudpickle (a part of Dask) is installed."""
+    """Lambdas and functions of an interpreter, by value, where cloudpickle (a part of Dask) is
+    installed."""
     try:
         import cloudpickle  # type: ignore[import-untyped,unused-ignore]
     except ImportError:
-        raise ArgumentError("run", run, f"a function of a module, which other processes can import ({error})") from None
+        raise ArgumentError(
+            "run", run, f"a function of a module, which other processes can import ({error})"
+        ) from None
     data: bytes = cloudpickle.dumps(run)
     return data

@@ -1,15 +1,14 @@
 """The store of a sweep: a directory of Parquet parts that is whole at every instant.
 
-    store.json            format of the store
-    parts/*.parquet       finished cases, one row a case; readable by pandas, polars and DuckDB as they are
-    arrays/*.parquet      arrays that run functions returned (trajectories): case, name, shape, values
-    runs/*.json           who ran what, with which versions, when
-    jobs/                 what Slurm array elements are to do
-    temporary/            parts being written
+    store.json            format of the store parts/*.parquet       finished cases, one row a case;
+    readable by pandas, polars and DuckDB as they are arrays/*.parquet      arrays that run
+    functions returned (trajectories): case, name, shape, values runs/*.json           who ran what,
+    with which versions, when jobs/                 what Slurm array elements are to do temporary/
+    parts being written
 
-A part is written under a temporary name, flushed to disk and renamed, and never changed afterwards. Its name
-is its chunk's and a random one, so that several writers never meet. Rows of the same case may exist several
-times; reading keeps one: a finished one before a failed one, then the last.
+A part is written under a temporary name, flushed to disk and renamed, and never changed afterwards.
+Its name is its chunk's and a random one, so that several writers never meet. Rows of the same case
+may exist several times; reading keeps one: a finished one before a failed one, then the last.
 """
 
 from __future__ import annotations
@@ -35,9 +34,13 @@ from trajopt.study.rows import DONE, RUN_COLUMNS, arrow
 
 FORMAT = 1
 _STALE = 24 * 3600.0  # s after which a temporary file's writer is taken for dead; chosen
-_READ_TRIES = 100  # listings of the parts before giving up, while compactions go on meanwhile; chosen
+_READ_TRIES = (
+    100  # listings of the parts before giving up, while compactions go on meanwhile; chosen
+)
 _COMPACT_ROWS = 1_000_000  # rows of one compacted part, to bound memory; chosen
-_ALIGNED_TOGETHER = 100  # parts of at most 10,000 rows that become one when their columns are completed; chosen
+_ALIGNED_TOGETHER = (
+    100  # parts of at most 10,000 rows that become one when their columns are completed; chosen
+)
 
 
 class StoreError(TrajoptError):
@@ -50,19 +53,25 @@ class Store:
 
     path: Path
 
-    # -- writing --------------------------------------------------------------------------------------
+    # -- writing
+    # --------------------------------------------------------------------------------------
 
     def write_part(self, folder: str, name: str, table: Any) -> str:
-        """Write an Arrow table durably as ``folder/name-<random>.parquet``; the file's name is returned.
+        """Write an Arrow table durably as ``folder/name-<random>.parquet``; the file's name is
+        returned.
 
-        Raises StoreError when the disk is full or the directory cannot be written; nothing half-written stays.
+        Raises StoreError when the disk is full or the directory cannot be written; nothing
+        half-written stays.
         """
         import pyarrow.parquet as pq
 
         unique = f"{name}-{uuid.uuid4().hex[:12]}.parquet"
         temporary = self.path / "temporary" / unique
         try:
-            for place in (temporary.parent, self.path / folder):  # git and some copies drop empty directories
+            for place in (
+                temporary.parent,
+                self.path / folder,
+            ):  # git and some copies drop empty directories
                 place.mkdir(exist_ok=True)
             with open(temporary, "wb") as file:
                 pq.write_table(table, file, compression="zstd")
@@ -92,7 +101,8 @@ class Store:
             temporary.unlink(missing_ok=True)
             raise _write_error(self.path, error) from None
 
-    # -- reading --------------------------------------------------------------------------------------
+    # -- reading
+    # --------------------------------------------------------------------------------------
 
     def parts(self, folder: str = "parts") -> list[Path]:
         """Files of whole parts, sorted by name."""
@@ -101,12 +111,14 @@ class Store:
     def table(self, columns: Sequence[str] | None = None) -> Any:
         """All cases as one Arrow table, one row a case, sorted by case.
 
-        ``columns`` limits what is read (case and status always are). Raises StoreError for a damaged part.
+        ``columns`` limits what is read (case and status always are). Raises StoreError for a
+        damaged part.
         """
         return one_row_a_case(self._union("parts", columns))
 
     def stable_table(self) -> Any:
-        """``table`` without the columns of time, host and path: equal for equal sweeps, however they ran."""
+        """``table`` without the columns of time, host and path: equal for equal sweeps, however
+        they ran."""
         table = self.table()
         return table.select(sorted(n for n in table.column_names if n not in RUN_COLUMNS))
 
@@ -127,23 +139,33 @@ class Store:
         """Cases by status."""
         table = self.table(["case", "status"])
         found = table["status"].value_counts().to_pylist()
-        return {entry["values"]: entry["counts"] for entry in sorted(found, key=lambda e: str(e["values"]))}
+        return {
+            entry["values"]: entry["counts"]
+            for entry in sorted(found, key=lambda e: str(e["values"]))
+        }
 
     def case(self, prefix: str) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
-        """Row and arrays of the one case whose identity starts with ``prefix``. Raises StoreError."""
+        """Row and arrays of the one case whose identity starts with ``prefix``. Raises
+        StoreError."""
         compute = arrow().compute
         table = self.table()
         table = table.filter(compute.starts_with(table["case"], prefix))
         if len(table) != 1:
-            raise StoreError(f"{self.path}: {len(table)} cases start with '{prefix}'; give more digits of one case")
+            raise StoreError(
+                f"{self.path}: {len(table)} cases start with '{prefix}'; give more digits of one case"
+            )
         row = table.to_pylist()[0]
         arrays: dict[str, NDArray[np.float64]] = {}
         beside = self._union("arrays", None, ("case", "=", row["case"]))
         for entry in beside.to_pylist():
-            arrays[entry["name"]] = np.asarray(entry["values"], dtype=np.float64).reshape(entry["shape"])
+            arrays[entry["name"]] = np.asarray(entry["values"], dtype=np.float64).reshape(
+                entry["shape"]
+            )
         return row, arrays
 
-    def _union(self, folder: str, columns: Sequence[str] | None, where: tuple[str, str, Any] | None = None) -> Any:
+    def _union(
+        self, folder: str, columns: Sequence[str] | None, where: tuple[str, str, Any] | None = None
+    ) -> Any:
         """Rows of all parts in one table; a column that a part lacks is null there."""
         pa = arrow()
         import pyarrow.parquet as pq
@@ -158,24 +180,36 @@ class Store:
                     wanted = None
                     if columns is not None:
                         names = pq.read_schema(file).names
-                        wanted = [n for n in dict.fromkeys(["case", "status", *columns]) if n in names]
+                        wanted = [
+                            n for n in dict.fromkeys(["case", "status", *columns]) if n in names
+                        ]
                     # One thread: parts are small, and workers must not outnumber their cores.
-                    tables[file] = pq.read_table(file, columns=wanted, use_threads=False, memory_map=False,
-                                                 filters=[where] if where else None)
+                    tables[file] = pq.read_table(
+                        file,
+                        columns=wanted,
+                        use_threads=False,
+                        memory_map=False,
+                        filters=[where] if where else None,
+                    )
                 except FileNotFoundError:  # compacted away between listing and reading: list again
                     gone = True
                 except (pa.ArrowInvalid, OSError) as error:
-                    raise StoreError(f"{file}: a damaged part ({error}); move it away, run again") from None
+                    raise StoreError(
+                        f"{file}: a damaged part ({error}); move it away, run again"
+                    ) from None
             if not gone:
                 break
             time.sleep(0.01 * attempt)
         else:
             raise StoreError(f"{self.path}: compactions go on without end; read when they are done")
         if not tables:
-            return pa.table({"case": pa.array([], pa.string()), "status": pa.array([], pa.string())})
+            return pa.table(
+                {"case": pa.array([], pa.string()), "status": pa.array([], pa.string())}
+            )
         return united(list(tables.values()))
 
-    # -- upkeep ---------------------------------------------------------------------------------------
+    # -- upkeep
+    # ---------------------------------------------------------------------------------------
 
     def compact(self) -> tuple[int, int]:
         """Merge small parts into large ones, dropping double rows; safe while sweeps run.
@@ -210,9 +244,11 @@ class Store:
         return before, len(self.parts())
 
     def align(self) -> None:
-        """Give all parts the same columns and types, as readers want that take the directory as it is.
+        """Give all parts the same columns and types, as readers want that take the directory as it
+        is.
 
-        Parts differ where only some cases have a result. Those that lack a column are merged into one that has it.
+        Parts differ where only some cases have a result. Those that lack a column are merged into
+        one that has it.
         """
         import pyarrow.parquet as pq
 
@@ -222,7 +258,9 @@ class Store:
                 schemas[file] = pq.read_schema(file)
         common = common_schema(schemas.values())
         columns = {f.name: f.type for f in common}
-        odd = [file for file, schema in schemas.items() if {f.name: f.type for f in schema} != columns]
+        odd = [
+            file for file, schema in schemas.items() if {f.name: f.type for f in schema} != columns
+        ]
         for start in range(0, len(odd), _ALIGNED_TOGETHER):
             self._merge("parts", odd[start : start + _ALIGNED_TOGETHER], common)
 
@@ -241,7 +279,9 @@ class Store:
 
     def runs(self) -> list[dict[str, Any]]:
         """Metadata of all runs, oldest first."""
-        found = [json.loads(p.read_text(encoding="utf-8")) for p in (self.path / "runs").glob("*.json")]
+        found = [
+            json.loads(p.read_text(encoding="utf-8")) for p in (self.path / "runs").glob("*.json")
+        ]
         return sorted(found, key=lambda r: str(r.get("started")))
 
 
@@ -260,19 +300,29 @@ def open_store(path: str | Path | Store, *, create: bool = True) -> Store:
         if place.exists() and any(place.iterdir()) and not (place / "temporary").is_dir():
             raise StoreError(f"{place}: neither empty nor a sweep store; give another directory")
         try:
-            for folder in ("temporary", "parts", "arrays", "runs", "jobs"):  # temporary first: it marks a store
+            for folder in (
+                "temporary",
+                "parts",
+                "arrays",
+                "runs",
+                "jobs",
+            ):  # temporary first: it marks a store
                 (place / folder).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise _write_error(place, error) from None
-        Store(place).write_text("store.json", json.dumps({"format": FORMAT, "kind": "trajopt sweep"}) + "\n")
+        Store(place).write_text(
+            "store.json", json.dumps({"format": FORMAT, "kind": "trajopt sweep"}) + "\n"
+        )
     try:
         found = json.loads(file.read_text(encoding="utf-8"))
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise StoreError(f"{file}: not readable as JSON ({error})") from None
     if not isinstance(found, Mapping) or found.get("format") != FORMAT:
         version = found.get("format") if isinstance(found, Mapping) else found
-        raise StoreError(f"{place}: store of format {version!r}, but this version reads and writes format {FORMAT}; "
-                         "use the trajopt version that wrote it (see runs/*.json), or another directory")
+        raise StoreError(
+            f"{place}: store of format {version!r}, but this version reads and writes format {FORMAT}; "
+            "use the trajopt version that wrote it (see runs/*.json), or another directory"
+        )
     return Store(place)
 
 
@@ -287,7 +337,9 @@ def _sync_directory(path: Path) -> None:
 
 def _write_error(path: Path, error: OSError) -> StoreError:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return StoreError(f"{path}: no space left; free some and run the same command again: finished cases are kept")
+        return StoreError(
+            f"{path}: no space left; free some and run the same command again: finished cases are kept"
+        )
     return StoreError(f"{path}: cannot write the store ({error})")
 
 

@@ -21,8 +21,19 @@ from trajopt.study.problem_run import RUN_NAMES, ProblemRun, SolveOptions, WithP
 from trajopt.study.runfunction import RunFunction, name_of
 from trajopt.study.sweeps import TIME_LIMIT, tabled
 
-_KEYS = ("title", "problem", "run", "code", "time_limit", "memory_limit", "solve", "axes", "sample", "derived",
-         "exclude")
+_KEYS = (
+    "title",
+    "problem",
+    "run",
+    "code",
+    "time_limit",
+    "memory_limit",
+    "solve",
+    "axes",
+    "sample",
+    "derived",
+    "exclude",
+)
 
 
 @dataclass(frozen=True)
@@ -44,7 +55,9 @@ def load_sweep(path: str | Path) -> SweepPlan:
         text = file.read_text(encoding="utf-8")
         data = tomllib.loads(text)
     except FileNotFoundError:
-        raise ProblemError(str(path), "file", "missing", "an existing sweep file (*.toml)") from None
+        raise ProblemError(
+            str(path), "file", "missing", "an existing sweep file (*.toml)"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
         raise ProblemError(str(path), "file", str(error), "valid TOML in UTF-8") from None
     for key in data:
@@ -67,9 +80,17 @@ def _plan(data: Mapping[str, Any], file: Path, text: str) -> SweepPlan:
     table = tabled(columns, run, data.get("code"), content)
     first = table.take(np.array([0])).rows()[0].values
     if problem is not None:
-        _check_names(first, problem, derived, exclude, uses_problem_only=isinstance(run, ProblemRun))
-    return SweepPlan(str(data.get("title", file.stem)), run, table, float(data.get("time_limit", TIME_LIMIT)),
-                     _bytes(data.get("memory_limit")), text)
+        _check_names(
+            first, problem, derived, exclude, uses_problem_only=isinstance(run, ProblemRun)
+        )
+    return SweepPlan(
+        str(data.get("title", file.stem)),
+        run,
+        table,
+        float(data.get("time_limit", TIME_LIMIT)),
+        _bytes(data.get("memory_limit")),
+        text,
+    )
 
 
 def _problem(file: Path, name: str) -> Problem | ManeuverProblem:
@@ -79,14 +100,23 @@ def _problem(file: Path, name: str) -> Problem | ManeuverProblem:
         tables = tomllib.loads(place.read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError):
         tables = {}  # load_problem says what is wrong
-    found = load_maneuver(place) if "obstacle" in tables and "goal" not in tables else load_problem(place)
+    found = (
+        load_maneuver(place)
+        if "obstacle" in tables and "goal" not in tables
+        else load_problem(place)
+    )
     if not isinstance(found, (Problem, ManeuverProblem)):
-        raise ArgumentError("problem", name, "a problem with a goal or an obstacle; for others use run = "
-                                             "'module:function' alone")
+        raise ArgumentError(
+            "problem",
+            name,
+            "a problem with a goal or an obstacle; for others use run = 'module:function' alone",
+        )
     return found
 
 
-def _run_function(data: Mapping[str, Any], problem: Problem | ManeuverProblem | None) -> tuple[RunFunction, Any]:
+def _run_function(
+    data: Mapping[str, Any], problem: Problem | ManeuverProblem | None
+) -> tuple[RunFunction, Any]:
     """The run function, and what a case's identity holds besides its values."""
     content = None if problem is None else problem.model_dump(mode="json", exclude_none=True)
     if "run" in data:
@@ -99,7 +129,9 @@ def _run_function(data: Mapping[str, Any], problem: Problem | ManeuverProblem | 
     if problem is None:
         raise ArgumentError("problem", None, "problem = 'file.toml', or run = 'module:function'")
     if not isinstance(problem, Problem):
-        raise ArgumentError("run", None, "run = 'module:function' beside a problem with an obstacle")
+        raise ArgumentError(
+            "run", None, "run = 'module:function' beside a problem with an obstacle"
+        )
     known = set(SolveOptions.__dataclass_fields__)
     given = data.get("solve", {})
     if set(given) - known:
@@ -108,20 +140,34 @@ def _run_function(data: Mapping[str, Any], problem: Problem | ManeuverProblem | 
     return ProblemRun(problem, options), [content, asdict(options)]
 
 
-def _check_names(first: Mapping[str, Any], problem: Problem | ManeuverProblem, derived: Mapping[str, str],
-                 exclude: Any, *, uses_problem_only: bool) -> None:
+def _check_names(
+    first: Mapping[str, Any],
+    problem: Problem | ManeuverProblem,
+    derived: Mapping[str, str],
+    exclude: Any,
+    *,
+    uses_problem_only: bool,
+) -> None:
     """Find wrong names now and not in a million rows."""
     unknown = [n for n in first if n.startswith("run.") and n not in RUN_NAMES]
     if unknown:
-        raise ArgumentError(f"axes.{unknown[0]}", first[unknown[0]], "one of " + ", ".join(RUN_NAMES))
+        raise ArgumentError(
+            f"axes.{unknown[0]}", first[unknown[0]], "one of " + ", ".join(RUN_NAMES)
+        )
     problem.replace(changes(first))
     if not uses_problem_only:
         return
-    used = " ".join([*map(str, derived.values()), *([exclude] if isinstance(exclude, str) else exclude)])
+    used = " ".join(
+        [*map(str, derived.values()), *([exclude] if isinstance(exclude, str) else exclude)]
+    )
     for name in first:
         if "." not in name and name != "repeat" and not re.search(rf"\b{re.escape(name)}\b", used):
-            raise ArgumentError(f"axes.{name}", first[name], "a dotted key of the problem, such as scene.friction, "
-                                                             "repeat, or a name that derived or exclude use")
+            raise ArgumentError(
+                f"axes.{name}",
+                first[name],
+                "a dotted key of the problem, such as scene.friction, "
+                "repeat, or a name that derived or exclude use",
+            )
 
 
 def _imported(name: str) -> Any:
@@ -143,8 +189,9 @@ def _bytes(value: Any) -> int | None:
     """Bytes of a memory limit: a number, or a text with kB, MB, GB."""
     if value is None or (isinstance(value, int) and not isinstance(value, bool) and value >= 0):
         return value
-    match = re.fullmatch(r"\s*([0-9.]+)\s*(k|M|G)i?B?\s*", value) if isinstance(value, str) else None
+    match = (
+        re.fullmatch(r"\s*([0-9.]+)\s*(k|M|G)i?B?\s*", value) if isinstance(value, str) else None
+    )
     if match is None:
         raise ArgumentError("memory_limit", value, "bytes, or a text such as '2 GB'")
     return int(float(match[1]) * {"k": 1e3, "M": 1e6, "G": 1e9}[match[2]])
-

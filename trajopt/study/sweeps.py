@@ -1,4 +1,5 @@
-"""``sweep``: run a function over many cases, keep every finished one, and go on where the last run ended."""
+"""``sweep``: run a function over many cases, keep every finished one, and go on where the last run
+ended."""
 
 from __future__ import annotations
 
@@ -33,25 +34,34 @@ TIME_LIMIT = 3600.0  # s a case may take where nothing else is said; chosen
 _PACKAGES = ("numpy", "scipy", "casadi", "pyarrow", "numba", "mujoco", "pybullet", "distributed")
 
 
-def sweep(cases: CaseTable | Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]], run: RunFunction, *,
-          executor: Engine | Executor | Callable[[], Executor] | int | None = None, store: str | Path | Store,
-          time_limit: float = TIME_LIMIT, memory_limit: int | None = None, code: str | None = None,
-          problem: Any = None, retry_failed: bool = False, source: str = "",
-          progress: Callable[[Progress], None] | None = None) -> Store:
+def sweep(
+    cases: CaseTable | Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]],
+    run: RunFunction,
+    *,
+    executor: Engine | Executor | Callable[[], Executor] | int | None = None,
+    store: str | Path | Store,
+    time_limit: float = TIME_LIMIT,
+    memory_limit: int | None = None,
+    code: str | None = None,
+    problem: Any = None,
+    retry_failed: bool = False,
+    source: str = "",
+    progress: Callable[[Progress], None] | None = None,
+) -> Store:
     """Run ``run(case)`` for every case that has no row in ``store`` yet, and return the store.
 
-    ``run`` gets a ``Case`` (values by name, ``seed``, ``rng()``) and returns a mapping of names to results
-    (numbers, texts, booleans, short lists; NumPy arrays are kept beside the table), a number, or None. A case
-    that raises, dies, or takes longer than ``time_limit`` s or more than ``memory_limit`` bytes of private
-    memory (0: unlimited; None: a fair share of the machine) becomes a row that says so; ``retry_failed`` runs
-    such cases again.
+    ``run`` gets a ``Case`` (values by name, ``seed``, ``rng()``) and returns a mapping of names to
+    results (numbers, texts, booleans, short lists; NumPy arrays are kept beside the table), a
+    number, or None. A case that raises, dies, or takes longer than ``time_limit`` s or more than
+    ``memory_limit`` bytes of private memory (0: unlimited; None: a fair share of the machine)
+    becomes a row that says so; ``retry_failed`` runs such cases again.
 
-    ``executor``: None (a process a processor), a number of processes, an ``Executor``, a factory for one (made
-    anew when it breaks), or an ``Engine``. ``code`` is the code version in a case's identity, ``problem`` what
-    else it depends on, ``source`` a sweep file's text for the record.
+    ``executor``: None (a process a processor), a number of processes, an ``Executor``, a factory
+    for one (made anew when it breaks), or an ``Engine``. ``code`` is the code version in a case's
+    identity, ``problem`` what else it depends on, ``source`` a sweep file's text for the record.
 
-    Raises ArgumentError, StoreError (format, full disk), RunLoadError; KeyboardInterrupt only after finished
-    cases are stored.
+    Raises ArgumentError, StoreError (format, full disk), RunLoadError; KeyboardInterrupt only after
+    finished cases are stored.
     """
     if not time_limit > 0:
         raise ArgumentError("time_limit", time_limit, "seconds > 0")
@@ -61,11 +71,15 @@ def sweep(cases: CaseTable | Iterable[Mapping[str, Any]] | Mapping[str, NDArray[
     table = tabled(cases, run, code, problem)
     engine, bundle = engine_of(executor), packed(run)
     place = open_store(store)
-    limits = CaseLimits(float(time_limit), default_memory() if memory_limit is None else memory_limit)
+    limits = CaseLimits(
+        float(time_limit), default_memory() if memory_limit is None else memory_limit
+    )
     places = missing(table, place, retry_failed=retry_failed)
     run_id = record_run(place, table, len(places), name_of(run), engine.name, source, limits)
     setup = Setup(place, run_id, bundle, limits, parameter_kinds(table))
-    drive = Drive(table, places, setup, engine, progress or (lambda _: None), known_kinds(place, table))
+    drive = Drive(
+        table, places, setup, engine, progress or (lambda _: None), known_kinds(place, table)
+    )
     outcome = "failed"
     try:
         if len(places):
@@ -84,15 +98,20 @@ def tabled(cases: Any, run: RunFunction, code: str | None, problem: Any) -> Case
     """Table of cases with identities for this run function, code and problem."""
     if isinstance(cases, CaseTable):
         return cases
-    table = case_table(cases, identity_base(name_of(run), problem, code or f"trajopt {trajopt.__version__}"))
+    table = case_table(
+        cases, identity_base(name_of(run), problem, code or f"trajopt {trajopt.__version__}")
+    )
     reserved = sorted(set(table.columns) & set(FIXED_COLUMNS))
     if reserved:
-        raise ArgumentError("cases", reserved, "names other than those of the table: " + ", ".join(FIXED_COLUMNS))
+        raise ArgumentError(
+            "cases", reserved, "names other than those of the table: " + ", ".join(FIXED_COLUMNS)
+        )
     return table
 
 
 def missing(table: CaseTable, store: Store, *, retry_failed: bool = False) -> NDArray[np.int64]:
-    """Positions of cases that have no row in the store (with ``retry_failed``: none that is done)."""
+    """Positions of cases that have no row in the store (with ``retry_failed``: none that is
+    done)."""
     known = store.finished(with_failed=not retry_failed)
     if len(known) == 0:
         return np.arange(len(table))
@@ -102,34 +121,70 @@ def missing(table: CaseTable, store: Store, *, retry_failed: bool = False) -> ND
 
 
 def known_kinds(store: Store, table: CaseTable) -> dict[str, Kind]:
-    """Kinds of result columns that are already in the store, so that new parts agree with old ones."""
+    """Kinds of result columns that are already in the store, so that new parts agree with old
+    ones."""
     import pyarrow.parquet as pq
 
     kinds: dict[str, Kind] = {}
-    names: dict[str, Kind] = {"double": "number", "bool": "flag", "string": "text", "list<element: double>": "numbers"}
+    names: dict[str, Kind] = {
+        "double": "number",
+        "bool": "flag",
+        "string": "text",
+        "list<element: double>": "numbers",
+    }
     parts = store.parts()
     for file in parts[:1] + parts[-1:]:
         for column in pq.read_schema(file):
             kind = names.get(str(column.type))
             name = column.name.removeprefix("result.")
-            if column.name not in table.columns and column.name not in FIXED_COLUMNS and kind is not None:
+            if (
+                column.name not in table.columns
+                and column.name not in FIXED_COLUMNS
+                and kind is not None
+            ):
                 kinds.setdefault(name, kind)
     return kinds
 
 
-# -- record of runs -----------------------------------------------------------------------------------
+# -- record of runs
+# -----------------------------------------------------------------------------------
 
 
-def record_run(store: Store, table: CaseTable, missing_cases: int, function: str, engine: str, source: str,
-               limits: CaseLimits) -> str:
+def record_run(
+    store: Store,
+    table: CaseTable,
+    missing_cases: int,
+    function: str,
+    engine: str,
+    source: str,
+    limits: CaseLimits,
+) -> str:
     """Write who runs what, with which versions; returns the run's name."""
     now = time.time()
     run_id = time.strftime("%Y%m%dT%H%M%S", time.gmtime(now)) + "-" + uuid.uuid4().hex[:8]
-    _write_record(store, run_id, {
-        "run": run_id, "state": "running", "started": now, "cases": len(table), "missing": missing_cases,
-        "function": function, "engine": engine, "time_limit_s": limits.seconds, "memory_limit_bytes": limits.memory,
-        "host": socket.gethostname(), "pid": os.getpid(), "command": sys.argv, "python": platform.python_version(),
-        "platform": platform.platform(), "versions": _versions(), "commit": _commit(), "sweep": source})
+    _write_record(
+        store,
+        run_id,
+        {
+            "run": run_id,
+            "state": "running",
+            "started": now,
+            "cases": len(table),
+            "missing": missing_cases,
+            "function": function,
+            "engine": engine,
+            "time_limit_s": limits.seconds,
+            "memory_limit_bytes": limits.memory,
+            "host": socket.gethostname(),
+            "pid": os.getpid(),
+            "command": sys.argv,
+            "python": platform.python_version(),
+            "platform": platform.platform(),
+            "versions": _versions(),
+            "commit": _commit(),
+            "sweep": source,
+        },
+    )
     return run_id
 
 
@@ -140,7 +195,9 @@ def close_record(store: Store, run_id: str, state: str, counts: Mapping[str, int
         entry = json.loads(file.read_text(encoding="utf-8"))
         entry.update(state=state, ended=time.time(), counts=dict(counts))
         _write_record(store, run_id, entry)
-    except Exception:  # a full disk: the reason is already on its way, and the record is not worth hiding it
+    except (
+        Exception
+    ):  # a full disk: the reason is already on its way, and the record is not worth hiding it
         if state == "finished":
             raise
 
@@ -160,11 +217,26 @@ def _versions() -> dict[str, str]:
 
 
 def _commit() -> str | None:
-    """Commit of the code, where it runs from a git checkout; with "+changes" where that is not clean."""
+    """Commit of the code, where it runs from a git checkout; with "+changes" where that is not
+    clean."""
     folder = Path(trajopt.__file__).parent
     try:
-        told = subprocess.run(["git", "-C", str(folder), "describe", "--always", "--dirty=+changes", "--abbrev=40",
-                               "--exclude=*"], capture_output=True, text=True, timeout=10, check=True)
+        told = subprocess.run(
+            [
+                "git",
+                "-C",
+                str(folder),
+                "describe",
+                "--always",
+                "--dirty=+changes",
+                "--abbrev=40",
+                "--exclude=*",
+            ],
+            capture_output=True,
+            text=True,
+            timeout=10,
+            check=True,
+        )
     except (OSError, subprocess.SubprocessError):
         return None
     return told.stdout.strip() or None

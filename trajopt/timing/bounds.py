@@ -1,4 +1,5 @@
-"""Time-optimal profile when no row holds s'^2: the fast pass for speed bounds and bounds on s'' alone."""
+"""Time-optimal profile when no row holds s'^2: the fast pass for speed bounds and bounds on s''
+alone."""
 
 from __future__ import annotations
 
@@ -13,7 +14,8 @@ Array = NDArray[np.float64]
 
 
 def only_bounds(stages: Stages) -> bool:
-    """Whether the fast pass is exact: no row holds s'^2, and s'' is bounded on both sides everywhere."""
+    """Whether the fast pass is exact: no row holds s'^2, and s'' is bounded on both sides
+    everywhere."""
     return not stages.b.any() and _bounds(stages) is not None
 
 
@@ -27,7 +29,9 @@ def bounds_profile(stages: Stages, start: float, end: float) -> Array:
 
     bounds = None if stages.b.any() else _bounds(stages)
     if bounds is None:
-        raise ArgumentError("engine", "bounds", "limits that bound s' and s'' alone; use engine='auto'")
+        raise ArgumentError(
+            "engine", "bounds", "limits that bound s' and s'' alone; use engine='auto'"
+        )
     lowest, highest = bounds
     end = allowed_end(stages, end)
     sets = np.empty((len(stages.s), 2))

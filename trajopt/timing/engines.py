@@ -16,16 +16,23 @@ from trajopt.timing.toppra import toppra_profile
 
 Array = NDArray[np.float64]
 
-ENGINES: Mapping[str, Callable[[Stages, float, float], Array]] = MappingProxyType({
-    "bounds": bounds_profile,
-    "compiled": compiled_profile,
-    "toppra": toppra_profile,
-})
-OTHERS = ("auto", "linear", "segments")  # names that choose one of the above, or another way to scale
+ENGINES: Mapping[str, Callable[[Stages, float, float], Array]] = MappingProxyType(
+    {
+        "bounds": bounds_profile,
+        "compiled": compiled_profile,
+        "toppra": toppra_profile,
+    }
+)
+OTHERS = (
+    "auto",
+    "linear",
+    "segments",
+)  # names that choose one of the above, or another way to scale
 
 
 def pick_engine(name: str, stages: Stages) -> str:
-    """The engine that ``name`` means for these rows: the fastest that is exact for "auto" and "segments"."""
+    """The engine that ``name`` means for these rows: the fastest that is exact for "auto" and
+    "segments"."""
     if name in ENGINES:
         return name
     if only_bounds(stages):
@@ -34,7 +41,8 @@ def pick_engine(name: str, stages: Stages) -> str:
 
 
 def require_engine(name: str) -> None:
-    """Raises ArgumentError for an unknown engine, MissingDependencyError for one that is not installed."""
+    """Raises ArgumentError for an unknown engine, MissingDependencyError for one that is not
+    installed."""
     if name not in (*OTHERS, *ENGINES):
         raise ArgumentError("engine", name, "one of " + ", ".join((*OTHERS, *ENGINES)))
     if name == "compiled" and not is_compiled():

@@ -22,14 +22,22 @@ def allowed_end(stages: Stages, end: float) -> float:
     if end > allowed * (1 + _SAME):
         bounds = stages.bounds[:, -1]
         # A ceiling below all limits is the one that scaling by segments sets.
-        limit = stages.names[int(np.argmin(bounds))] if bounds.min() <= allowed * (1 + _SAME) else "segments"
-        raise InfeasibleError(limit, float(stages.s[-1]),
-                              f"the end speed {np.sqrt(end):.6g} m/s exceeds {np.sqrt(allowed):.6g} m/s")
+        limit = (
+            stages.names[int(np.argmin(bounds))]
+            if bounds.min() <= allowed * (1 + _SAME)
+            else "segments"
+        )
+        raise InfeasibleError(
+            limit,
+            float(stages.s[-1]),
+            f"the end speed {np.sqrt(end):.6g} m/s exceeds {np.sqrt(allowed):.6g} m/s",
+        )
     return float(min(end, allowed))
 
 
 def empty_set(stages: Stages, failed: int, sets: Array) -> InfeasibleError:
-    """The error for a controllable set that is empty at gridpoint ``failed``, given the sets after it."""
+    """The error for a controllable set that is empty at gridpoint ``failed``, given the sets after
+    it."""
     place = float(stages.s[failed])
     low, high = sets[failed + 1]
     free = np.array([0.0, np.inf])
@@ -37,19 +45,27 @@ def empty_set(stages: Stages, failed: int, sets: Array) -> InfeasibleError:
     after = free if alone else sets[failed + 1]
     cures = [name for k, name in enumerate(stages.names) if _feasible(stages, failed, after, k)]
     broken = stages.c[failed : failed + 2].min(axis=0) < 0
-    at_rest = {stages.names[k] for k in stages.row_owner[broken]}  # limits that standing still breaks
+    at_rest = {
+        stages.names[k] for k in stages.row_owner[broken]
+    }  # limits that standing still breaks
     cures.sort(key=lambda name: name not in at_rest)
     limit = cures[0] if cures else _least_slack_at_rest(stages, failed)
     if limit in at_rest:
-        reason = ("standing still breaks it (slope, friction or centre of gravity), and no speed that the "
-                  "other limits allow helps")
+        reason = (
+            "standing still breaks it (slope, friction or centre of gravity), and no speed that the "
+            "other limits allow helps"
+        )
     elif alone:
         reason = "no speed keeps all limits here"
     else:
-        reason = (f"no speed here leads into the range {np.sqrt(max(low, 0.0)):.6g} to "
-                  f"{np.sqrt(high):.6g} m/s that the rest of the path needs")
+        reason = (
+            f"no speed here leads into the range {np.sqrt(max(low, 0.0)):.6g} to "
+            f"{np.sqrt(high):.6g} m/s that the rest of the path needs"
+        )
     others = [name for name in cures[1:] if name != limit]
-    return InfeasibleError(limit, place, reason + (f"; together with {', '.join(others)}" if others else ""))
+    return InfeasibleError(
+        limit, place, reason + (f"; together with {', '.join(others)}" if others else "")
+    )
 
 
 def require_start_speed(stages: Stages, start: float, sets: Array) -> None:
@@ -60,16 +76,21 @@ def require_start_speed(stages: Stages, start: float, sets: Array) -> None:
     place = float(stages.s[0])
     speeds = f"{np.sqrt(low):.6g} to {np.sqrt(high):.6g} m/s"
     raise InfeasibleError(
-        _responsible_for_start(stages, start, sets[-1]), place,
-        f"the start speed {np.sqrt(start):.6g} m/s is outside {speeds}, from which the end can be reached")
+        _responsible_for_start(stages, start, sets[-1]),
+        place,
+        f"the start speed {np.sqrt(start):.6g} m/s is outside {speeds}, from which the end can be reached",
+    )
 
 
 def require_bounded(stages: Stages, sets: Array) -> None:
     """Raises InfeasibleError where no limit bounds the motion."""
     loose = np.flatnonzero(sets[:, 1] >= SD2_CAP * (1 - _SAME))
     if len(loose):
-        raise InfeasibleError("none", float(stages.s[loose[0]]),
-                              "no limit bounds the motion here; add a speed or wheel limit")
+        raise InfeasibleError(
+            "none",
+            float(stages.s[loose[0]]),
+            "no limit bounds the motion here; add a speed or wheel limit",
+        )
 
 
 def require_motion(stages: Stages, sd2: Array) -> None:
@@ -82,14 +103,27 @@ def require_motion(stages: Stages, sd2: Array) -> None:
     free = np.array([0.0, np.inf])
     cures = [name for k, name in enumerate(stages.names) if _top(stages, i, free, k) > 0]
     zero = stages.bounds[:, i : i + 2].min(axis=1) <= 0
-    limit = stages.names[int(np.argmax(zero))] if zero.any() else (cures[0] if cures else stages.names[0])
-    raise InfeasibleError(limit, float(stages.s[i]),
-                          "the robot must stand still here; end the path at the stop, or split it there")
+    limit = (
+        stages.names[int(np.argmax(zero))]
+        if zero.any()
+        else (cures[0] if cures else stages.names[0])
+    )
+    raise InfeasibleError(
+        limit,
+        float(stages.s[i]),
+        "the robot must stand still here; end the path at the stop, or split it there",
+    )
 
 
-def _without(stages: Stages, which: slice, dropped: int | None) -> tuple[Array, Array, Array, Array, Array]:
+def _without(
+    stages: Stages, which: slice, dropped: int | None
+) -> tuple[Array, Array, Array, Array, Array]:
     """s, a, b, c, sd2_max of some gridpoints, without one limit."""
-    keep = np.ones(len(stages.row_owner), dtype=bool) if dropped is None else stages.row_owner != dropped
+    keep = (
+        np.ones(len(stages.row_owner), dtype=bool)
+        if dropped is None
+        else stages.row_owner != dropped
+    )
     others = [k for k in range(len(stages.names)) if k != dropped]
     bound = np.min(stages.bounds[others][:, which], axis=0, initial=np.inf)
     a, b, c = (np.ascontiguousarray(m[which][:, keep]) for m in (stages.a, stages.b, stages.c))

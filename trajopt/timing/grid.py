@@ -14,7 +14,9 @@ from trajopt.paths.path import Path
 
 Array = NDArray[np.float64]
 
-_CELLS = 400  # intervals on a path when the caller does not say; chosen: refinement adds what is missing
+_CELLS = (
+    400  # intervals on a path when the caller does not say; chosen: refinement adds what is missing
+)
 _CELLS_PER_SEGMENT = 20  # at least this many on a spline segment; chosen
 _MERGE = 1e-12  # gridpoints closer than this share of the path's length are one
 
@@ -36,22 +38,31 @@ def initial_grid(path: Path, gridpoints: int | ArrayLike | None) -> Array:
     else:
         places = np.asarray(gridpoints, dtype=np.float64)
         tolerance = 1e-9 * path.length
-        if places.ndim != 1 or not np.all((places >= -tolerance) & (places <= path.length + tolerance)):
-            raise ArgumentError("gridpoints", places.tolist(), f"path parameters in [0, {path.length:.6g}] m")
+        if places.ndim != 1 or not np.all(
+            (places >= -tolerance) & (places <= path.length + tolerance)
+        ):
+            raise ArgumentError(
+                "gridpoints", places.tolist(), f"path parameters in [0, {path.length:.6g}] m"
+            )
         return insert(path, knots, places)
     s0 = path.knot_parameters
-    steps = [a + h * np.arange(1, int(n)) / n for a, h, n in zip(s0[:-1], spans, cells, strict=True)]
+    steps = [
+        a + h * np.arange(1, int(n)) / n for a, h, n in zip(s0[:-1], spans, cells, strict=True)
+    ]
     return insert(path, knots, np.concatenate(steps))
 
 
 def insert(path: Path, u: Array, places: Array) -> Array:
-    """Grid u with gridpoints added at path parameters ``places``; those that are there already merge."""
+    """Grid u with gridpoints added at path parameters ``places``; those that are there already
+    merge."""
     inside = places[(places > 0) & (places < path.length)]
     if not len(inside):
         return u
     new = path.locate(inside)
     merge = _MERGE * (path.end - path.start)
-    near = np.abs(u[np.clip(np.searchsorted(u, new), 1, len(u) - 1)[:, None] - [[1, 0]]] - new[:, None])
+    near = np.abs(
+        u[np.clip(np.searchsorted(u, new), 1, len(u) - 1)[:, None] - [[1, 0]]] - new[:, None]
+    )
     new = np.sort(new[near.min(axis=1) > merge])
     new = new[np.concatenate([[True], np.diff(new) > merge])] if len(new) else new
     return np.sort(np.concatenate([u, new]))

@@ -1,13 +1,14 @@
 """Reachability analysis of TOPP-RA as plain loops, compiled by numba where it is installed.
 
-With x = s'^2 and u = s'', interval i of length d obeys the rows of its left end, a0 u + b0 x <= c0, and of
-its right end, where x has grown to x + 2 d u: (a1 + 2 d b1) u + b1 x <= c1. For given x the rows with a
-positive coefficient of u bound u from above, those with a negative one from below. gap(x) = lowest upper
-bound - highest lower bound is concave in x, so the ends of the interval {x : gap(x) >= 0} are found by
-Newton's method from outside, exactly and in a few steps (each tangent is a pair of rows).
+With x = s'^2 and u = s'', interval i of length d obeys the rows of its left end, a0 u + b0 x <= c0,
+and of its right end, where x has grown to x + 2 d u: (a1 + 2 d b1) u + b1 x <= c1. For given x the
+rows with a positive coefficient of u bound u from above, those with a negative one from below.
+gap(x) = lowest upper bound - highest lower bound is concave in x, so the ends of the interval {x :
+gap(x) >= 0} are found by Newton's method from outside, exactly and in a few steps (each tangent is
+a pair of rows).
 
-Import this module where it is first used: numba takes a second to load. Without numba the same functions run
-interpreted: right, but slow.
+Import this module where it is first used: numba takes a second to load. Without numba the same
+functions run interpreted: right, but slow.
 """
 
 from __future__ import annotations
@@ -38,12 +39,14 @@ def _compiled(function: Callable[P, R]) -> Callable[P, R]:
 
 
 @_compiled
-def _bounds_on_u(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float,
-                 x: float) -> tuple[float, float, float, float, float, float, int, int]:
-    """Upper and lower bound on u at x in interval i, their slopes, the bounds that flat rows set on x, and
-    which rows set the bounds on u (see _row).
+def _bounds_on_u(
+    a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float, x: float
+) -> tuple[float, float, float, float, float, float, int, int]:
+    """Upper and lower bound on u at x in interval i, their slopes, the bounds that flat rows set on
+    x, and which rows set the bounds on u (see _row).
 
-    Bounds are kept as fractions and compared crosswise: a division a row would take most of the time.
+    Bounds are kept as fractions and compared crosswise: a division a row would take most of the
+    time.
     """
     rows = a.shape[1]
     n_up, p_up, q_up, up = high - x, 2 * d, 1.0, -1
@@ -72,9 +75,19 @@ def _bounds_on_u(a: Array, b: Array, c: Array, i: int, d: float, low: float, hig
 
 
 @_compiled
-def _row(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float, which: int,
-         is_upper: bool) -> tuple[float, float, float]:
-    """p, q, c of p u + q x <= c: row ``which`` of interval i, counted over both ends; -1 is the next set."""
+def _row(
+    a: Array,
+    b: Array,
+    c: Array,
+    i: int,
+    d: float,
+    low: float,
+    high: float,
+    which: int,
+    is_upper: bool,
+) -> tuple[float, float, float]:
+    """p, q, c of p u + q x <= c: row ``which`` of interval i, counted over both ends; -1 is the
+    next set."""
     if which < 0:
         return (2 * d, 1.0, high) if is_upper else (-2 * d, -1.0, -low)
     rows = a.shape[1]
@@ -84,8 +97,18 @@ def _row(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float
 
 
 @_compiled
-def _crossing(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float, up: int, lower: int,
-              x_cap: float) -> float:
+def _crossing(
+    a: Array,
+    b: Array,
+    c: Array,
+    i: int,
+    d: float,
+    low: float,
+    high: float,
+    up: int,
+    lower: int,
+    x_cap: float,
+) -> float:
     """The x above which the rows ``up`` and ``lower`` exclude each other, at most x_cap."""
     p_up, q_up, c_up = _row(a, b, c, i, d, low, high, up, True)
     p_low, q_low, c_low = _row(a, b, c, i, d, low, high, lower, False)
@@ -99,8 +122,17 @@ def _crossing(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: 
 
 
 @_compiled
-def _end_of_feasible(a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float,
-                     x_first: float, x_last: float) -> tuple[float, int, int]:
+def _end_of_feasible(
+    a: Array,
+    b: Array,
+    c: Array,
+    i: int,
+    d: float,
+    low: float,
+    high: float,
+    x_first: float,
+    x_last: float,
+) -> tuple[float, int, int]:
     """The feasible x nearest to x_first, going towards x_last, and the rows that bound u there.
 
     NaN when there is none between them.
@@ -108,8 +140,9 @@ def _end_of_feasible(a: Array, b: Array, c: Array, i: int, d: float, low: float,
     down = x_first >= x_last
     x = x_first
     for _ in range(4 * a.shape[1] + 50):
-        upper, upper_slope, lower, lower_slope, x_max, x_min, r_up, r_low = _bounds_on_u(a, b, c, i, d, low,
-                                                                                         high, x)
+        upper, upper_slope, lower, lower_slope, x_max, x_min, r_up, r_low = _bounds_on_u(
+            a, b, c, i, d, low, high, x
+        )
         if x_max < x - _TOUCH * abs(x):
             if not down:
                 return np.nan, -1, -1
@@ -139,8 +172,9 @@ def _end_of_feasible(a: Array, b: Array, c: Array, i: int, d: float, low: float,
 def controllable(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, sets: Array) -> int:
     """Backward pass: fills sets (G, 2), the s'^2 from which sets[-1] can be reached.
 
-    Returns the gridpoint whose set is empty, or -1 when none is. The rows that met at one gridpoint mostly
-    meet at the one before as well, and where they cross is a bound to start Newton's method from.
+    Returns the gridpoint whose set is empty, or -1 when none is. The rows that met at one gridpoint
+    mostly meet at the one before as well, and where they cross is a bound to start Newton's method
+    from.
     """
     up, lower = -1, -1
     rest_after = False
@@ -172,7 +206,8 @@ def controllable(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, sets: A
 
 @_compiled
 def fastest(s: Array, a: Array, b: Array, c: Array, sets: Array, start: float, sd2: Array) -> None:
-    """Forward pass: fills sd2 (G,), the greedy (and optimal) profile inside the controllable sets."""
+    """Forward pass: fills sd2 (G,), the greedy (and optimal) profile inside the controllable
+    sets."""
     sd2[0] = start
     for i in range(len(s) - 1):
         x = sd2[i]
@@ -192,9 +227,11 @@ def fastest(s: Array, a: Array, b: Array, c: Array, sets: Array, start: float, s
 
 @_compiled
 def bounds_of_intervals(s: Array, a: Array, c: Array, lowest: Array, highest: Array) -> bool:
-    """Fills lowest and highest (G-1,), the bounds on u in each interval, from rows a u <= c without x.
+    """Fills lowest and highest (G-1,), the bounds on u in each interval, from rows a u <= c without
+    x.
 
-    False when u is not bounded on both sides everywhere, or a flat row is broken: then this pass is no use.
+    False when u is not bounded on both sides everywhere, or a flat row is broken: then this pass is
+    no use.
     """
     low_before, high_before = -np.inf, np.inf
     for i in range(len(s)):
@@ -215,7 +252,9 @@ def bounds_of_intervals(s: Array, a: Array, c: Array, lowest: Array, highest: Ar
 
 
 @_compiled
-def controllable_in_bounds(s: Array, lowest: Array, highest: Array, sd2_max: Array, sets: Array) -> int:
+def controllable_in_bounds(
+    s: Array, lowest: Array, highest: Array, sd2_max: Array, sets: Array
+) -> int:
     """Backward pass of ``controllable`` where u has bounds of its own: two lines a gridpoint."""
     for i in range(len(s) - 2, -1, -1):
         grow = 2 * (s[i + 1] - s[i])
@@ -244,12 +283,21 @@ def fastest_in_bounds(s: Array, highest: Array, sets: Array, start: float, sd2: 
 
 
 @_compiled
-def fastest_of_many(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, start: Array, end: Array,
-                    sd2: Array, failed: NDArray[np.intp]) -> None:
+def fastest_of_many(
+    s: Array,
+    a: Array,
+    b: Array,
+    c: Array,
+    sd2_max: Array,
+    start: Array,
+    end: Array,
+    sd2: Array,
+    failed: NDArray[np.intp],
+) -> None:
     """Both passes for P paths: s, sd2_max, sd2 (P, G), a, b, c (P, G, R), start, end, failed (P,).
 
-    ``failed`` gets the gridpoint whose set is empty (0 also when the start speed is not in it), or -1; the
-    profile of such a path is NaN.
+    ``failed`` gets the gridpoint whose set is empty (0 also when the start speed is not in it), or
+    -1; the profile of such a path is NaN.
     """
     sets = np.empty((s.shape[1], 2))
     for p in range(s.shape[0]):
@@ -262,6 +310,8 @@ def fastest_of_many(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, star
         if failed[p] < 0 and not sets[0, 0] - slack <= start[p] <= sets[0, 1] + slack:
             failed[p] = 0
         if failed[p] < 0:
-            fastest(s[p], a[p], b[p], c[p], sets, min(max(start[p], sets[0, 0]), sets[0, 1]), sd2[p])
+            fastest(
+                s[p], a[p], b[p], c[p], sets, min(max(start[p], sets[0, 0]), sets[0, 1]), sd2[p]
+            )
         else:
             sd2[p] = np.nan

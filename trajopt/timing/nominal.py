@@ -1,4 +1,5 @@
-"""A path executed at uniform spline speed in a given time, limits or not: what thesis 000 commands."""
+"""A path executed at uniform spline speed in a given time, limits or not: what thesis 000
+commands."""
 
 from __future__ import annotations
 
@@ -19,12 +20,19 @@ from trajopt.world.terrain import Flat, Terrain
 Array = NDArray[np.float64]
 
 
-def nominal_timing(path: Path, duration: float, limits: Sequence[Limit], *, robot: Platform | None = None,
-                   terrain: Terrain | None = None) -> Trajectory:
+def nominal_timing(
+    path: Path,
+    duration: float,
+    limits: Sequence[Limit],
+    *,
+    robot: Platform | None = None,
+    terrain: Terrain | None = None,
+) -> Trajectory:
     """Trajectory along ``path`` in ``duration`` s with the spline parameter uniform in time.
 
-    Nothing is scaled: ``margins()`` of the result say by how much ``limits`` are kept or broken. The motion
-    neither starts nor ends at rest. Raises ArgumentError for a duration that is not positive.
+    Nothing is scaled: ``margins()`` of the result say by how much ``limits`` are kept or broken.
+    The motion neither starts nor ends at rest. Raises ArgumentError for a duration that is not
+    positive.
     """
     if not (np.isfinite(duration) and duration > 0):
         raise ArgumentError("duration", duration, "a time > 0 s")
@@ -33,5 +41,15 @@ def nominal_timing(path: Path, duration: float, limits: Sequence[Limit], *, robo
     sd2 = linear_profile(path, u)
     unscaled = float(np.sum(2 * np.diff(s) / (np.sqrt(sd2[:-1]) + np.sqrt(sd2[1:]))))
     sd2 = sd2 * (unscaled / duration) ** 2
-    return Trajectory(path, tuple(limits), robot, terrain or Flat(), u, s, np.sqrt(sd2),
-                      np.diff(sd2) / (2 * np.diff(s)), "nominal", 1.0)
+    return Trajectory(
+        path,
+        tuple(limits),
+        robot,
+        terrain or Flat(),
+        u,
+        s,
+        np.sqrt(sd2),
+        np.diff(sd2) / (2 * np.diff(s)),
+        "nominal",
+        1.0,
+    )

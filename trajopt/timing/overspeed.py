@@ -1,7 +1,7 @@
 """A robot that is faster than a bound allows: it can only brake into it.
 
-A speed bound below the current speed has no motion (a zone appears, a replanner lowers a limit). The fastest
-braking that the other rows leave is then the least that the bound must give way.
+A speed bound below the current speed has no motion (a zone appears, a replanner lowers a limit).
+The fastest braking that the other rows leave is then the least that the bound must give way.
 """
 
 from __future__ import annotations
@@ -17,13 +17,16 @@ from trajopt.timing.stages import FineRows, Stages, stages_of
 
 Array = NDArray[np.float64]
 
-_KEPT_BACK = 1e-3  # share of the possible braking that is not used, for rows between gridpoints; chosen
+_KEPT_BACK = (
+    1e-3  # share of the possible braking that is not used, for rows between gridpoints; chosen
+)
 _FLAT = 1e-13  # a row (divided by its scale) with a smaller coefficient of s'' does not bound it
 _ROUNDING = 1e-9  # relative, on s'^2
 
 
 def yielding(limits: Sequence[Limit], fine: FineRows, start: float) -> tuple[Limit, ...]:
-    """``limits``, those with a bound below the fastest braking from s'^2 = ``start`` raised to it."""
+    """``limits``, those with a bound below the fastest braking from s'^2 = ``start`` raised to
+    it."""
     stages = stages_of(fine)
     squares = _braking(stages, start) * (1 + _ROUNDING)
     stops = int(np.argmin(squares > 0)) if (squares <= 0).any() else len(squares) - 1
@@ -33,7 +36,11 @@ def yielding(limits: Sequence[Limit], fine: FineRows, start: float) -> tuple[Lim
     found: list[Limit] = []
     for limit, bound in zip(limits, stages.bounds, strict=True):
         over = squares > bound * (1 + _ROUNDING)
-        found.append(Yielding(limit, places, shown, _crossings(stages.s, squares - bound)) if over.any() else limit)
+        found.append(
+            Yielding(limit, places, shown, _crossings(stages.s, squares - bound))
+            if over.any()
+            else limit
+        )
     return tuple(found)
 
 
@@ -45,10 +52,16 @@ def _braking(stages: Stages, start: float) -> Array:
         grow = 2 * (stages.s[i + 1] - stages.s[i])
         if grow > 0:
             p = np.concatenate([stages.a[i], stages.a[i + 1] + grow * stages.b[i + 1]])
-            n = np.concatenate([stages.c[i] - stages.b[i] * x, stages.c[i + 1] - stages.b[i + 1] * x])
+            n = np.concatenate(
+                [stages.c[i] - stages.b[i] * x, stages.c[i + 1] - stages.b[i + 1] * x]
+            )
             down = p < -_FLAT
             hardest = float((n[down] / p[down]).max(initial=-np.inf))
-            x = max(x + grow * (hardest + _KEPT_BACK * abs(hardest)), 0.0) if np.isfinite(hardest) else 0.0
+            x = (
+                max(x + grow * (hardest + _KEPT_BACK * abs(hardest)), 0.0)
+                if np.isfinite(hardest)
+                else 0.0
+            )
         squares[i + 1] = x
         if x <= 0:
             break

@@ -27,12 +27,18 @@ from trajopt.world.terrain import Flat, Terrain
 
 Array = NDArray[np.float64]
 
-REFINE_ABOVE = 1e-5  # violation of s'^2 between gridpoints, relative, that is refined away if it can; chosen
+REFINE_ABOVE = (
+    1e-5  # violation of s'^2 between gridpoints, relative, that is refined away if it can; chosen
+)
 REFINE_ROUNDS = 4  # rounds spent on that; chosen
 MOST_ROUNDS = 16  # rounds before giving up on a violation above the largest slow-down; chosen
 LARGEST_SLOWDOWN = 1.001  # of time; DESIGN: at most 0.1 %
 _KEPT = 1e-9  # relative violation that counts as none
-_TIGHTER = (0.0, 1e-4, 1e-3)  # shares taken off all limits, in turn, where slowing down does not help; chosen
+_TIGHTER = (
+    0.0,
+    1e-4,
+    1e-3,
+)  # shares taken off all limits, in turn, where slowing down does not help; chosen
 _FASTEST = 1e6  # m/s, chosen: beyond it is an input error, and squares stay far from overflow
 
 
@@ -50,35 +56,50 @@ class _Job:
     engine: str
 
 
-def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
-               terrain: Terrain | None = None, start_speed: float = 0.0, end_speed: float = 0.0,
-               gridpoints: int | ArrayLike | None = None, engine: str = "auto",
-               stops: ArrayLike = (), too_fast: Literal["refuse", "brake"] = "refuse") -> Trajectory:
-    """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s', m/s).
+def time_scale(
+    path: Path,
+    limits: Sequence[Limit],
+    *,
+    robot: Platform | None = None,
+    terrain: Terrain | None = None,
+    start_speed: float = 0.0,
+    end_speed: float = 0.0,
+    gridpoints: int | ArrayLike | None = None,
+    engine: str = "auto",
+    stops: ArrayLike = (),
+    too_fast: Literal["refuse", "brake"] = "refuse",
+) -> Trajectory:
+    """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s',
+    m/s).
 
-    ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast pass, where only
-    s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are slower motions: "linear"
-    (thesis 004: one factor for the whole motion, uniform in the spline parameter, with the end speeds that
-    the path gives it, so start and end speed must stay 0) and "segments" (below the speed of a factor for
-    each spline segment). ``gridpoints``: how many, or path parameters (m); more are added where limits are
-    broken between them. ``stops``: path parameters (m) where the robot comes to rest on the way. ``too_fast``:
-    what to do where a bound on the speed alone (speed, zone, profile, wheel speed, yaw rate) lies below what
-    braking from ``start_speed`` can reach, as when a zone appears in front of a moving robot: "refuse" raises
-    InfeasibleError, "brake" brakes into it as fast as the other limits allow (with 99.9 % of it); the
-    trajectory's limits, and so its margins, then hold the bound that was raised to that braking.
+    ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast
+    pass, where only s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are
+    slower motions: "linear" (thesis 004: one factor for the whole motion, uniform in the spline
+    parameter, with the end speeds that the path gives it, so start and end speed must stay 0) and
+    "segments" (below the speed of a factor for each spline segment). ``gridpoints``: how many, or
+    path parameters (m); more are added where limits are broken between them. ``stops``: path
+    parameters (m) where the robot comes to rest on the way. ``too_fast``: what to do where a bound
+    on the speed alone (speed, zone, profile, wheel speed, yaw rate) lies below what braking from
+    ``start_speed`` can reach, as when a zone appears in front of a moving robot: "refuse" raises
+    InfeasibleError, "brake" brakes into it as fast as the other limits allow (with 99.9 % of it);
+    the trajectory's limits, and so its margins, then hold the bound that was raised to that
+    braking.
 
-    What is still broken between gridpoints is removed by slowing the whole motion, end speeds included, by
-    at most 0.1 % (``Trajectory.slowdown``). Where standing still breaks a limit (momentum over a slope that
-    is too slippery) slowing does not help; then all limits are taken 0.01 or 0.1 % tighter instead.
+    What is still broken between gridpoints is removed by slowing the whole motion, end speeds
+    included, by at most 0.1 % (``Trajectory.slowdown``). Where standing still breaks a limit
+    (momentum over a slope that is too slippery) slowing does not help; then all limits are taken
+    0.01 or 0.1 % tighter instead.
 
-    Raises ArgumentError for bad arguments, InfeasibleError (limit and place) where no motion exists, and
-    MissingDependencyError for "compiled" without numba.
+    Raises ArgumentError for bad arguments, InfeasibleError (limit and place) where no motion
+    exists, and MissingDependencyError for "compiled" without numba.
     """
     job = _job(path, limits, robot, terrain, (start_speed, end_speed), engine, stops)
     u = insert(path, initial_grid(path, gridpoints), job.stops)
     _require_drivable(job, u)
     if too_fast == "brake" and start_speed > 0:
-        job = replace(job, limits=yielding(job.limits, fine_rows(path, u, job.limits, robot), job.start))
+        job = replace(
+            job, limits=yielding(job.limits, fine_rows(path, u, job.limits, robot), job.start)
+        )
     elif too_fast not in ("refuse", "brake"):
         raise ArgumentError("too_fast", too_fast, "refuse or brake")
     if engine == "linear":
@@ -90,15 +111,24 @@ def time_scale(path: Path, limits: Sequence[Limit], *, robot: Platform | None = 
         if slack.min() >= -_KEPT:
             return _trajectory(job, fine, sd2, factor, name)
     at, k = np.unravel_index(int(np.argmin(slack)), slack.shape)
-    raise InfeasibleError(job.limits[int(k)].name, float(fine.s[int(at)]), f"it is broken by {-slack.min():.2g} of "
-                          "its size, and slowing down does not help (rest breaks it, or nearly)")
+    raise InfeasibleError(
+        job.limits[int(k)].name,
+        float(fine.s[int(at)]),
+        f"it is broken by {-slack.min():.2g} of "
+        "its size, and slowing down does not help (rest breaks it, or nearly)",
+    )
 
 
-def rough_duration(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
-                   gridpoints: int | ArrayLike | None = None) -> float:
-    """Duration (s) from rest to rest of the fastest profile that keeps the limits at the gridpoints; between them
-    nothing is checked or refused. It ranks paths faster than ``time_scale``, on flat ground; raises
-    as that does at the gridpoints.
+def rough_duration(
+    path: Path,
+    limits: Sequence[Limit],
+    *,
+    robot: Platform | None = None,
+    gridpoints: int | ArrayLike | None = None,
+) -> float:
+    """Duration (s) from rest to rest of the fastest profile that keeps the limits at the
+    gridpoints; between them nothing is checked or refused. It ranks paths faster than
+    ``time_scale``, on flat ground; raises as that does at the gridpoints.
     """
     job = _job(path, limits, robot, None, (0.0, 0.0), "auto", ())
     u = initial_grid(path, gridpoints)
@@ -107,13 +137,22 @@ def rough_duration(path: Path, limits: Sequence[Limit], *, robot: Platform | Non
     profile = ENGINES[pick_engine(job.engine, stages)](stages, job.start, job.end)
     require_motion(stages, profile)
     speed = np.sqrt(profile[stages.kept])
-    return float(np.sum(2 * np.diff(fine.s) / (speed[1:] + speed[:-1])))  # s'' is constant between gridpoints
+    return float(
+        np.sum(2 * np.diff(fine.s) / (speed[1:] + speed[:-1]))
+    )  # s'' is constant between gridpoints
 
 
-def start_speeds(path: Path, limits: Sequence[Limit], *, robot: Platform | None = None,
-                 terrain: Terrain | None = None, end_speed: float = 0.0,
-                 gridpoints: int | ArrayLike | None = None) -> tuple[float, float]:
-    """Lowest and highest start speed (m/s) from which the end of the path can be reached within limits.
+def start_speeds(
+    path: Path,
+    limits: Sequence[Limit],
+    *,
+    robot: Platform | None = None,
+    terrain: Terrain | None = None,
+    end_speed: float = 0.0,
+    gridpoints: int | ArrayLike | None = None,
+) -> tuple[float, float]:
+    """Lowest and highest start speed (m/s) from which the end of the path can be reached within
+    limits.
 
     Raises as ``time_scale``.
     """
@@ -126,8 +165,15 @@ def start_speeds(path: Path, limits: Sequence[Limit], *, robot: Platform | None 
     return float(low), float(high)
 
 
-def _job(path: Path, limits: Sequence[Limit], robot: Platform | None, terrain: Terrain | None,
-         speeds: tuple[float, float], engine: str, stops: ArrayLike) -> _Job:
+def _job(
+    path: Path,
+    limits: Sequence[Limit],
+    robot: Platform | None,
+    terrain: Terrain | None,
+    speeds: tuple[float, float],
+    engine: str,
+    stops: ArrayLike,
+) -> _Job:
     """The checked arguments. Raises ArgumentError."""
     if not isinstance(path, Path):
         raise ArgumentError("path", path, "a Path")
@@ -151,15 +197,19 @@ def _job(path: Path, limits: Sequence[Limit], robot: Platform | None, terrain: T
     if places.ndim != 1 or not np.all((places > 0) & (places < path.length)):
         raise ArgumentError("stops", stops, f"path parameters between 0 and {path.length:.6g} m")
     if engine == "linear" and (any(speeds) or len(places)):
-        raise ArgumentError("start_speed, end_speed, stops", (*speeds, *places),
-                            "0 and none: linear scaling takes the path's own speeds")
+        raise ArgumentError(
+            "start_speed, end_speed, stops",
+            (*speeds, *places),
+            "0 and none: linear scaling takes the path's own speeds",
+        )
     ground = Flat() if terrain is None else terrain
     ground.check(path)
     return _Job(path, tuple(limits), robot, ground, speeds[0] ** 2, speeds[1] ** 2, places, engine)
 
 
 def _require_drivable(job: _Job, u: Array) -> None:
-    """Raises InfeasibleError where the path has no direction, or the robot's wheels forbid its twist."""
+    """Raises InfeasibleError where the path has no direction, or the robot's wheels forbid its
+    twist."""
     require_moving(job.path)
     twist = sample_at(job.path, job.path.parameter(u), u).twist
     if job.robot is None:
@@ -168,12 +218,17 @@ def _require_drivable(job: _Job, u: Array) -> None:
     bad = np.abs(slipping).max(axis=1) > 1e-6 * np.abs(twist).max(axis=1)
     if bad.any():
         place = float(job.path.parameter(u[bad][:1])[0])
-        raise InfeasibleError("rolling", place, f"the wheels of '{job.robot.name}' cannot roll along this path; "
-                              "leave its heading to the direction of travel")
+        raise InfeasibleError(
+            "rolling",
+            place,
+            f"the wheels of '{job.robot.name}' cannot roll along this path; "
+            "leave its heading to the direction of travel",
+        )
 
 
 def _stages(job: _Job, fine: FineRows, tighter: float) -> Stages:
-    """What the engine solves: rows at the ends of all intervals, stops, and the ceiling of "segments"."""
+    """What the engine solves: rows at the ends of all intervals, stops, and the ceiling of
+    "segments"."""
     stages = stages_of(fine)
     ceiling = stages.sd2_max * (1 - tighter)
     if job.engine == "segments":
@@ -188,12 +243,15 @@ def _with_edges(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Stages]:
     """Rows and stages on the grid u and on the edges of the limits."""
     fine = fine_rows(job.path, u, job.limits, job.robot)
     if fine.edges:
-        fine = refined(job.path, fine, insert(job.path, u, np.asarray(fine.edges)), job.limits, job.robot)
+        fine = refined(
+            job.path, fine, insert(job.path, u, np.asarray(fine.edges)), job.limits, job.robot
+        )
     return fine, _stages(job, fine, tighter)
 
 
 def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, float, str]:
-    """Rows, s'^2, the factor on it that is left, and engine, on a grid refined where limits are broken."""
+    """Rows, s'^2, the factor on it that is left, and engine, on a grid refined where limits are
+    broken."""
     fine, stages = _with_edges(job, u, tighter)
     for done in range(MOST_ROUNDS):
         name = pick_engine(job.engine, stages)
@@ -204,28 +262,49 @@ def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, floa
         excess = np.maximum(found.factor - 1, -found.slack.min(axis=1))
         worst = float(excess.max())
         if worst <= REFINE_ABOVE or (done >= REFINE_ROUNDS and worst <= LARGEST_SLOWDOWN - 1):
-            return fine, sd2, float(found.factor.max()), "segments" if job.engine == "segments" else name
+            return (
+                fine,
+                sd2,
+                float(found.factor.max()),
+                "segments" if job.engine == "segments" else name,
+            )
         if done < MOST_ROUNDS - 1:
             grid = split(fine.u, excess > REFINE_ABOVE, 3)
             fine = refined(job.path, fine, grid, job.limits, job.robot)
             stages = _stages(job, fine, tighter)
     at = int(np.argmax(excess))
     limit = job.limits[int(np.argmin(found.slack[at]))].name
-    raise InfeasibleError(limit, float(fine.s[at]), "it is broken between gridpoints, however fine the grid: "
-                          "it jumps here, or falls to zero too fast to be followed")
+    raise InfeasibleError(
+        limit,
+        float(fine.s[at]),
+        "it is broken between gridpoints, however fine the grid: "
+        "it jumps here, or falls to zero too fast to be followed",
+    )
 
 
 def _trajectory(job: _Job, fine: FineRows, sd2: Array, factor: float, engine: str) -> Trajectory:
     """The trajectory with s'^2 divided by ``factor``, reported as its slow-down."""
     sd2 = sd2 / factor
-    return Trajectory(job.path, job.limits, job.robot, job.terrain, fine.u, fine.s, np.sqrt(sd2),
-                      np.diff(sd2) / (2 * np.diff(fine.s)), engine, float(np.sqrt(factor)))
+    return Trajectory(
+        job.path,
+        job.limits,
+        job.robot,
+        job.terrain,
+        fine.u,
+        fine.s,
+        np.sqrt(sd2),
+        np.diff(sd2) / (2 * np.diff(fine.s)),
+        engine,
+        float(np.sqrt(factor)),
+    )
 
 
 def _linear(job: _Job, fine: FineRows) -> Trajectory:
     """One factor on the time of the whole motion (thesis 004, eqs. 2.34 to 2.39)."""
     if fine.edges:
-        fine = refined(job.path, fine, insert(job.path, fine.u, np.asarray(fine.edges)), job.limits, job.robot)
+        fine = refined(
+            job.path, fine, insert(job.path, fine.u, np.asarray(fine.edges)), job.limits, job.robot
+        )
     sd2 = linear_profile(job.path, fine.u)
     found = check(fine, sd2)
     worst = float(found.factor.max())
@@ -235,5 +314,8 @@ def _linear(job: _Job, fine: FineRows) -> Trajectory:
         if found.slack.min() >= -_KEPT:
             return _trajectory(job, fine, sd2, 1.0, "linear")
     at, k = np.unravel_index(int(np.argmin(found.slack)), found.slack.shape)
-    raise InfeasibleError(job.limits[int(k)].name, float(fine.s[int(at)]), "no factor on time keeps it: rest "
-                          "breaks it, it is zero here, or nothing bounds the motion")
+    raise InfeasibleError(
+        job.limits[int(k)].name,
+        float(fine.s[int(at)]),
+        "no factor on time keeps it: rest breaks it, it is zero here, or nothing bounds the motion",
+    )

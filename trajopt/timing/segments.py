@@ -1,9 +1,10 @@
-"""A factor of its own for every spline segment, to follow a given profile (thesis 004, eqs. 2.40 and 2.41).
+"""A factor of its own for every spline segment, to follow a given profile (thesis 004, eqs. 2.40
+and 2.41).
 
-The thesis scales the time of each segment so that the motion touches the limits (or the given speed profile)
-once a segment. The speed then jumps at the knots, which no robot can do. ``segment_factors`` gives the
-thesis's factors; as an engine, the scaled speeds are taken as a ceiling, and the fastest profile below it that
-keeps all limits is driven.
+The thesis scales the time of each segment so that the motion touches the limits (or the given speed
+profile) once a segment. The speed then jumps at the knots, which no robot can do.
+``segment_factors`` gives the thesis's factors; as an engine, the scaled speeds are taken as a
+ceiling, and the fastest profile below it that keeps all limits is driven.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ Array = NDArray[np.float64]
 
 
 def segment_factors(path: Path, fine: FineRows) -> Array:
-    """(K-1,): factor on the time of each segment, whose nominal time is its span of spline parameter (s).
+    """(K-1,): factor on the time of each segment, whose nominal time is its span of spline
+    parameter (s).
 
     0 where nothing bounds the motion of a segment. The thesis's duration is factors @ diff(knots).
     """

@@ -18,16 +18,22 @@ Array = NDArray[np.float64]
 
 
 def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, float]:
-    """Seconds saved when one limit at a time grows by ``change`` of its size (1 % by default), by name.
+    """Seconds saved when one limit at a time grows by ``change`` of its size (1 % by default), by
+    name.
 
-    Speeds grow by that share, rows by that share of their scale (a wheel acceleration limit, mu g, ...).
-    Solved again on the trajectory's own grid, so differences are free of the grid's error. Raises
-    ArgumentError for a trajectory that is not time-optimal (linear, segments), or a change that is not > 0.
+    Speeds grow by that share, rows by that share of their scale (a wheel acceleration limit, mu g,
+    ...). Solved again on the trajectory's own grid, so differences are free of the grid's error.
+    Raises ArgumentError for a trajectory that is not time-optimal (linear, segments), or a change
+    that is not > 0.
     """
     if not (np.isfinite(change) and change > 0):
         raise ArgumentError("change", change, "a share > 0, as 0.01 for one percent")
     if trajectory.engine not in ENGINES:
-        raise ArgumentError("trajectory.engine", trajectory.engine, "a time-optimal trajectory: " + ", ".join(ENGINES))
+        raise ArgumentError(
+            "trajectory.engine",
+            trajectory.engine,
+            "a time-optimal trajectory: " + ", ".join(ENGINES),
+        )
     fine = fine_rows(trajectory.path, trajectory.u, trajectory.limits, trajectory.robot)
     stages = stages_of(fine)
     stopped = np.repeat(trajectory.sd <= 0, 2)[1:-1]

@@ -1,8 +1,9 @@
 """Rows of all limits on a grid, and how far a profile stays inside them.
 
-A profile is s'^2 at the gridpoints; between them s'' is constant, so s'^2 is linear in s. An interval obeys
-the rows at both of its ends with its own s'' (the interpolation scheme of TOPP-RA); whether it obeys them in
-between is checked on a grid ten times finer. Rows depend on the path alone: each interval's are computed once.
+A profile is s'^2 at the gridpoints; between them s'' is constant, so s'^2 is linear in s. An
+interval obeys the rows at both of its ends with its own s'' (the interpolation scheme of TOPP-RA);
+whether it obeys them in between is checked on a grid ten times finer. Rows depend on the path
+alone: each interval's are computed once.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ _CHUNK = 1000  # intervals worked on at once, to bound memory
 class Stages:
     """Rows a s'' + b s'^2 <= c at G places, divided by their scale, and bounds on s'^2.
 
-    A place between two intervals is there twice, once for each of them (limits from the left and from the
-    right differ at knots), as an interval of length zero.
+    A place between two intervals is there twice, once for each of them (limits from the left and
+    from the right differ at knots), as an interval of length zero.
     """
 
     s: Array  # (G,) path parameter, m, not decreasing
@@ -71,8 +72,8 @@ class FineRows:
 class Check:
     """How far a profile keeps the limits on the fine grid.
 
-    ``slack`` (N, L): least relative margin of each limit in each interval. ``factor`` (N,): the s'^2 of the
-    profile divided by it would keep all limits that rest keeps.
+    ``slack`` (N, L): least relative margin of each limit in each interval. ``factor`` (N,): the
+    s'^2 of the profile divided by it would keep all limits that rest keeps.
     """
 
     slack: Array
@@ -80,7 +81,8 @@ class Check:
 
 
 def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Platform | None) -> Stages:
-    """Rows of all limits at the samples. Raises ArgumentError where a limit's rows are not finite."""
+    """Rows of all limits at the samples. Raises ArgumentError where a limit's rows are not
+    finite."""
     rows = [limit.rows(samples, robot) for limit in limits]
     counts = [r.a.shape[1] for r in rows]
     shape = (len(samples.s), sum(counts))
@@ -99,7 +101,9 @@ def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Platform | No
     if bad.any() or np.isnan(bounds).any():
         in_bounds = int(np.argmax(np.isnan(bounds).any(axis=1)))
         which = int(owner[np.argmax(bad.any(axis=0))]) if bad.any() else in_bounds
-        raise ArgumentError(f"limits[{which}] '{rows[which].name}'", "not finite", "finite rows on the path")
+        raise ArgumentError(
+            f"limits[{which}] '{rows[which].name}'", "not finite", "finite rows on the path"
+        )
     edges = tuple(sorted({edge for r in rows for edge in r.edges}))
     names = tuple(r.name for r in rows)
     return Stages(samples.s, a, b, c, np.min(bounds, axis=0), names, owner, bounds, edges)
@@ -108,13 +112,16 @@ def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Platform | No
 def fine_rows(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | None) -> FineRows:
     """Rows of all limits inside every interval of the grid u (N+1,)."""
     (share, a, b, c, bounds), some = _rows_inside(path, u[:-1], u[1:], limits, robot)
-    return FineRows(u, path.parameter(u), share, a, b, c, bounds, some.names, some.row_owner, some.edges)
+    return FineRows(
+        u, path.parameter(u), share, a, b, c, bounds, some.names, some.row_owner, some.edges
+    )
 
 
-def _rows_inside(path: Path, left: Array, right: Array, limits: Sequence[Limit],
-                 robot: Platform | None) -> tuple[tuple[Array, ...], Stages]:
-    """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,); and the last of the pieces that
-    they were assembled in, which has names, owners and edges."""
+def _rows_inside(
+    path: Path, left: Array, right: Array, limits: Sequence[Limit], robot: Platform | None
+) -> tuple[tuple[Array, ...], Stages]:
+    """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,); and the last
+    of the pieces that they were assembled in, which has names, owners and edges."""
     found: tuple[Array, ...] = ()
     for first in range(0, len(left), _CHUNK):
         part = slice(first, min(first + _CHUNK, len(left)))
@@ -122,8 +129,13 @@ def _rows_inside(path: Path, left: Array, right: Array, limits: Sequence[Limit],
         s = path.parameter(fine.ravel())
         rows = assemble(sample_at(path, s, fine.ravel()), limits, robot)
         s = s.reshape(fine.shape)
-        pieces = ((s - s[:, :1]) / (s[:, -1:] - s[:, :1]),
-                  *(values.reshape(*fine.shape, -1) for values in (rows.a, rows.b, rows.c, rows.bounds.T)))
+        pieces = (
+            (s - s[:, :1]) / (s[:, -1:] - s[:, :1]),
+            *(
+                values.reshape(*fine.shape, -1)
+                for values in (rows.a, rows.b, rows.c, rows.bounds.T)
+            ),
+        )
         if not found:
             found = tuple(np.empty((len(left), *piece.shape[1:])) for piece in pieces)
         for target, piece in zip(found, pieces, strict=True):
@@ -131,7 +143,9 @@ def _rows_inside(path: Path, left: Array, right: Array, limits: Sequence[Limit],
     return found, rows
 
 
-def refined(path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot: Platform | None) -> FineRows:
+def refined(
+    path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot: Platform | None
+) -> FineRows:
     """Rows on the grid u (M+1,), which contains that of ``fine``: what is known is taken over."""
     at = np.searchsorted(u, fine.u)
     whole = np.flatnonzero(np.diff(at) == 1)  # intervals of the old grid that stay
@@ -147,9 +161,18 @@ def refined(path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot
         values[fresh] = added
         return values
 
-    return FineRows(u, path.parameter(u), merged(fine.share, new[0]), merged(fine.a, new[1]),
-                    merged(fine.b, new[2]), merged(fine.c, new[3]), merged(fine.bounds, new[4]),
-                    fine.names, fine.row_owner, fine.edges)
+    return FineRows(
+        u,
+        path.parameter(u),
+        merged(fine.share, new[0]),
+        merged(fine.a, new[1]),
+        merged(fine.b, new[2]),
+        merged(fine.c, new[3]),
+        merged(fine.bounds, new[4]),
+        fine.names,
+        fine.row_owner,
+        fine.edges,
+    )
 
 
 def stages_of(fine: FineRows) -> Stages:
@@ -161,8 +184,17 @@ def stages_of(fine: FineRows) -> Stages:
 
     bounds = ends(fine.bounds)
     s = np.repeat(fine.s, 2)[1:-1]
-    return Stages(s, ends(fine.a), ends(fine.b), ends(fine.c), np.min(bounds, axis=1), fine.names,
-                  fine.row_owner, bounds.T, fine.edges)
+    return Stages(
+        s,
+        ends(fine.a),
+        ends(fine.b),
+        ends(fine.c),
+        np.min(bounds, axis=1),
+        fine.names,
+        fine.row_owner,
+        bounds.T,
+        fine.edges,
+    )
 
 
 def check(fine: FineRows, sd2: Array) -> Check:

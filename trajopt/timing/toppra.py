@@ -19,16 +19,18 @@ Array = NDArray[np.float64]
 def toppra_profile(stages: Stages, start: float, end: float) -> Array:
     """(G,) s'^2 of the fastest profile with s'^2 = ``start`` and ``end`` at the ends.
 
-    The rows are handed over already in interpolation form, with the left and right limits of a knot kept
-    apart, so toppra's own discretisation switch (which custom constraints ignore silently) is not needed.
-    Raises InfeasibleError naming limit and place.
+    The rows are handed over already in interpolation form, with the left and right limits of a knot
+    kept apart, so toppra's own discretisation switch (which custom constraints ignore silently) is
+    not needed. Raises InfeasibleError naming limit and place.
     """
     end = allowed_end(stages, end)
     kept = stages.kept
     group = np.cumsum(np.concatenate([[False], np.diff(stages.s) > 0]))
     grid = stages.s[kept]
     instance = _instance(stages, kept, grid)
-    _, speed, _, raw = instance.compute_parameterization(np.sqrt(start), np.sqrt(end), return_data=True)
+    _, speed, _, raw = instance.compute_parameterization(
+        np.sqrt(start), np.sqrt(end), return_data=True
+    )
     sets = np.asarray(raw, dtype=np.float64)[group]
     bad = np.flatnonzero(np.isnan(sets).any(axis=1))
     if len(bad):
@@ -37,7 +39,9 @@ def toppra_profile(stages: Stages, start: float, end: float) -> Array:
     require_bounded(stages, sets)
     if speed is None or not np.all(np.isfinite(speed)):
         place = float(grid[int(np.argmax(~np.isfinite(speed)))]) if speed is not None else 0.0
-        raise InfeasibleError("toppra", place, "its solver failed numerically; use engine='compiled'")
+        raise InfeasibleError(
+            "toppra", place, "its solver failed numerically; use engine='compiled'"
+        )
     return np.asarray(np.asarray(speed, dtype=np.float64)[group] ** 2)
 
 
@@ -46,7 +50,9 @@ def _instance(stages: Stages, kept: NDArray[np.intp], grid: Array) -> Any:
     from toppra.algorithm import TOPPRA
     from toppra.constraint import LinearConstraint
 
-    logging.getLogger("toppra").setLevel(logging.CRITICAL)  # what it warns of is raised here, with its reason
+    logging.getLogger("toppra").setLevel(
+        logging.CRITICAL
+    )  # what it warns of is raised here, with its reason
     right = kept[1:]  # the left limit at the right end of each interval
     left = right - 1  # the right limit at its left end
     step = np.diff(grid)[:, None]
@@ -62,5 +68,10 @@ def _instance(stages: Stages, kept: NDArray[np.intp], grid: Array) -> Any:
     constraint.identical = True
     constraint.compute_constraint_params = lambda *_: (*rows, None, limits)
     path = SimpleNamespace(path_interval=np.array([grid[0], grid[-1]]), dof=1)
-    return TOPPRA([constraint], path, gridpoints=grid, solver_wrapper="seidel",
-                  parametrizer="ParametrizeConstAccel")
+    return TOPPRA(
+        [constraint],
+        path,
+        gridpoints=grid,
+        solver_wrapper="seidel",
+        parametrizer="ParametrizeConstAccel",
+    )

@@ -36,7 +36,8 @@ class Stretch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Robot state at N times. Poses are (x, y, yaw) in the world, twists (vx, vy, wz) in the body frame."""
+    """Robot state at N times. Poses are (x, y, yaw) in the world, twists (vx, vy, wz) in the body
+    frame."""
 
     pose: Array  # (N, 3) m, m, rad (yaw continuous along the path)
     twist: Array  # (N, 3) m/s, m/s, rad/s
@@ -46,10 +47,11 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """A path with a speed profile: s'' is constant between gridpoints, so s'^2 is linear in s there.
+    """A path with a speed profile: s'' is constant between gridpoints, so s'^2 is linear in s
+    there.
 
-    ``slowdown`` >= 1 is the factor by which the whole motion was slowed uniformly, after the solver, so that
-    the limits hold between gridpoints as well. ``engine`` says what computed it.
+    ``slowdown`` >= 1 is the factor by which the whole motion was slowed uniformly, after the
+    solver, so that the limits hold between gridpoints as well. ``engine`` says what computed it.
     """
 
     path: Path
@@ -66,7 +68,9 @@ class Trajectory:
     @cached_property
     def times(self) -> Array:
         """(N+1,): times at the gridpoints, s."""
-        return np.concatenate([[0.0], np.cumsum(2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:]))])
+        return np.concatenate(
+            [[0.0], np.cumsum(2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:]))]
+        )
 
     @property
     def duration(self) -> float:
@@ -74,7 +78,8 @@ class Trajectory:
         return float(self.times[-1])
 
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
-        """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0, duration]."""
+        """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,
+        duration]."""
         time = np.atleast_1d(np.asarray(t, dtype=np.float64))
         slack = _ON_TIME * self.duration
         if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
@@ -86,7 +91,8 @@ class Trajectory:
         return np.clip(s, self.s[i], self.s[i + 1]), speed, self.sdd[i]
 
     def at(self, t: ArrayLike) -> State:
-        """State at times t (N,) or one time (N = 1), s. Raises ArgumentError outside [0, duration]."""
+        """State at times t (N,) or one time (N = 1), s. Raises ArgumentError outside [0,
+        duration]."""
         s, speed, _ = self.along(t)
         u = self.path.locate(s)
         samples = sample_at(self.path, s, u)
@@ -100,13 +106,17 @@ class Trajectory:
         return State(pose, twist, self._wheels.at(u), twist @ self.robot.inverse.T)
 
     def margins(self) -> Mapping[str, float]:
-        """Least relative margin of every limit, recomputed on a grid ten times finer than the solver's."""
+        """Least relative margin of every limit, recomputed on a grid ten times finer than the
+        solver's."""
         least = self._check.slack.min(axis=0)
-        return MappingProxyType({limit.name: float(m) for limit, m in zip(self.limits, least, strict=True)})
+        return MappingProxyType(
+            {limit.name: float(m) for limit, m in zip(self.limits, least, strict=True)}
+        )
 
     @cached_property
     def binding(self) -> tuple[str, ...]:
-        """(N,): name of the limit that binds in each interval between gridpoints, "" where none does."""
+        """(N,): name of the limit that binds in each interval between gridpoints, "" where none
+        does."""
         slack = self._check.slack
         least = np.argmin(slack, axis=1)
         tight = slack[np.arange(len(slack)), least] < _BINDS
@@ -114,12 +124,16 @@ class Trajectory:
 
     @cached_property
     def active(self) -> tuple[Stretch, ...]:
-        """Stretches of the path with the limit that binds there; where none binds there is no stretch."""
+        """Stretches of the path with the limit that binds there; where none binds there is no
+        stretch."""
         names = np.array(self.binding)
         starts = np.flatnonzero(np.concatenate([[True], names[1:] != names[:-1]]))
         ends = np.append(starts[1:], len(names))
-        return tuple(Stretch(float(self.s[i]), float(self.s[j]), str(names[i]))
-                     for i, j in zip(starts, ends, strict=True) if names[i])
+        return tuple(
+            Stretch(float(self.s[i]), float(self.s[j]), str(names[i]))
+            for i, j in zip(starts, ends, strict=True)
+            if names[i]
+        )
 
     @cached_property
     def _check(self) -> Check:

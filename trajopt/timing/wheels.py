@@ -14,7 +14,10 @@ from trajopt.robots.platform import Platform
 Array = NDArray[np.float64]
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
-_FIRST_CELLS, _MOST_CELLS = 16, 2048  # quadrature cells a spline segment, doubled until the angles settle
+_FIRST_CELLS, _MOST_CELLS = (
+    16,
+    2048,
+)  # quadrature cells a spline segment, doubled until the angles settle
 _SETTLED = 1e-11  # rad; change of every segment's wheel angles on doubling
 
 
@@ -34,7 +37,8 @@ class WheelTable:
 
 
 def wheel_table(path: Path, robot: Platform) -> WheelTable:
-    """Table of wheel angles whose quadrature is refined until it changes by less than 1e-11 rad a segment."""
+    """Table of wheel angles whose quadrature is refined until it changes by less than 1e-11 rad a
+    segment."""
     knots, cells = np.asarray(path.basis.knots), _FIRST_CELLS
     u, gained = _cells(path, robot, knots, cells)
     while cells < _MOST_CELLS:
@@ -44,7 +48,9 @@ def wheel_table(path: Path, robot: Platform) -> WheelTable:
         u, gained = finer_u, finer
         if np.abs(change).max() < _SETTLED:
             break
-    return WheelTable(path, robot, u, np.vstack([np.zeros((1, gained.shape[1])), np.cumsum(gained, axis=0)]))
+    return WheelTable(
+        path, robot, u, np.vstack([np.zeros((1, gained.shape[1])), np.cumsum(gained, axis=0)])
+    )
 
 
 def _by_segment(gained: Array, cells: int) -> Array:

@@ -20,8 +20,8 @@ FINE_STEPS = 360  # steps along a path when it is checked, chosen: 6 mm on a 2 m
 
 @dataclass(frozen=True)
 class FreeGround:
-    """Where a footprint may be, m: ``x`` and ``y`` intervals, and n . p <= ``step_distance`` with the step's
-    unit normal ``step_normal``; ``footprint`` (K, 2) corners in the body frame."""
+    """Where a footprint may be, m: ``x`` and ``y`` intervals, and n . p <= ``step_distance`` with
+    the step's unit normal ``step_normal``; ``footprint`` (K, 2) corners in the body frame."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -30,13 +30,19 @@ class FreeGround:
     footprint: tuple[tuple[float, float], ...]
 
     def rooms(self, x: Any, y: Any, yaw: Any) -> list[Any]:
-        """Distance (m, negative outside) of each corner from each border, at poses of any shape or symbols."""
+        """Distance (m, negative outside) of each corner from each border, at poses of any shape or
+        symbols."""
         cos, sin, (a, b) = np.cos(yaw), np.sin(yaw), self.step_normal
         found = []
         for cx, cy in self.footprint:
             px, py = x + cx * cos - cy * sin, y + cx * sin + cy * cos
-            found += [px - self.x[0], self.x[1] - px, py - self.y[0], self.y[1] - py,
-                      self.step_distance - a * px - b * py]
+            found += [
+                px - self.x[0],
+                self.x[1] - px,
+                py - self.y[0],
+                self.y[1] - py,
+                self.step_distance - a * px - b * py,
+            ]
         return found
 
     def margin(self, x: Array, y: Array, yaw: Array) -> Array:
@@ -44,7 +50,8 @@ class FreeGround:
         return np.asarray(np.min(self.rooms(x, y, yaw), axis=0))
 
     def complaint(self, x: float, y: float, yaw: float) -> str:
-        """Which border the footprint crosses at one pose, and by how much; empty where it is free."""
+        """Which border the footprint crosses at one pose, and by how much; empty where it is
+        free."""
         names = ("x from", "x to", "y from", "y to", "the step")
         rooms = np.reshape(self.rooms(x, y, yaw), (-1, len(names))).min(axis=0)
         worst = int(np.argmin(rooms))
@@ -55,7 +62,8 @@ class FreeGround:
 
 
 def path_margin(path: Path, ground: FreeGround, steps: int = FINE_STEPS) -> float:
-    """Least distance (m) of the footprint from any border along a path; negative where it crosses one."""
+    """Least distance (m) of the footprint from any border along a path; negative where it crosses
+    one."""
     u = np.linspace(path.start, path.end, steps + 1)
     p = path.position(u)
     return float(ground.margin(p[:, 0], p[:, 1], path.yaw(u)).min())

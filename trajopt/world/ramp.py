@@ -15,16 +15,19 @@ from trajopt.paths.spline import SplineBasis
 
 Array = NDArray[np.float64]
 
-_EDGE_KNOTS = 8  # knots across a rounded edge when a path is laid over a ramp; chosen: z within 0.1 mm
+_EDGE_KNOTS = (
+    8  # knots across a rounded edge when a path is laid over a ramp; chosen: z within 0.1 mm
+)
 
 
 @dataclass(frozen=True)
 class Ramp:
     """A ramp rising by ``height`` (m, < 0 falls) over ``run`` (m, horizontal) from its foot line.
 
-    The foot passes through ``place`` (x, y), m, and the ramp rises along ``direction`` (rad, world); beyond
-    it the ground stays at ``height``. Both edges are rounded over ``rounding`` (m), as a robot with that
-    distance between its axles feels them: the height is the mean of the sharp ramp over that length.
+    The foot passes through ``place`` (x, y), m, and the ramp rises along ``direction`` (rad,
+    world); beyond it the ground stays at ``height``. Both edges are rounded over ``rounding`` (m),
+    as a robot with that distance between its axles feels them: the height is the mean of the sharp
+    ramp over that length.
     """
 
     place: tuple[float, float]
@@ -42,8 +45,10 @@ class Ramp:
 
     def along(self, x: Array, y: Array) -> Array:
         """Distance from the foot line along the ramp, m."""
-        return np.asarray((x - self.place[0]) * np.cos(self.direction)
-                          + (y - self.place[1]) * np.sin(self.direction))
+        return np.asarray(
+            (x - self.place[0]) * np.cos(self.direction)
+            + (y - self.place[1]) * np.sin(self.direction)
+        )
 
     def height_at(self, x: Array, y: Array) -> Array:
         """Ground height, m, at world positions."""
@@ -81,20 +86,28 @@ class Ramps:
         slope = np.abs(sample_at(path, np.zeros_like(u), u).slope)
         if slope.max() > self.grade * (1 + 1e-9):
             i = int(np.argmax(slope > self.grade))
-            raise InfeasibleError("grade", float(path.parameter(u[[i]])[0]),
-                                  f"the ground is {np.degrees(slope.max()):.3g} deg steep, the robot climbs "
-                                  f"{np.degrees(self.grade):.3g} deg")
+            raise InfeasibleError(
+                "grade",
+                float(path.parameter(u[[i]])[0]),
+                f"the ground is {np.degrees(slope.max()):.3g} deg steep, the robot climbs "
+                f"{np.degrees(self.grade):.3g} deg",
+            )
 
 
 def lay_over(path: Path, ramps: Sequence[Ramp]) -> Path:
-    """The level ``path`` with z from the ramps' height: same curve in the plane, more knots at the edges.
+    """The level ``path`` with z from the ramps' height: same curve in the plane, more knots at the
+    edges.
 
-    A cubic spline keeps its curve when knots are added, so x and y do not change. Raises ArgumentError for a
-    path with a heading of its own or one that has a height already.
+    A cubic spline keeps its curve when knots are added, so x and y do not change. Raises
+    ArgumentError for a path with a heading of its own or one that has a height already.
     """
     if path.heading is not None or path.coordinates.shape[1] != 2:
-        raise ArgumentError("path", path.coordinates.shape, "a level path that drives along its heading")
-    u = np.unique(np.concatenate([np.asarray(path.basis.knots), *(_edge_knots(path, r) for r in ramps)]))
+        raise ArgumentError(
+            "path", path.coordinates.shape, "a level path that drives along its heading"
+        )
+    u = np.unique(
+        np.concatenate([np.asarray(path.basis.knots), *(_edge_knots(path, r) for r in ramps)])
+    )
     keep = np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])
     u = u[keep]
     u[-1] = path.end
@@ -115,8 +128,10 @@ def _edge_knots(path: Path, ramp: Ramp) -> Array:
     p = path.position(u)
     d = ramp.along(p[:, 0], p[:, 1])
     half = ramp.rounding / 2
-    levels = np.concatenate([edge + np.linspace(-half, half, _EDGE_KNOTS + 1)
-                             for edge in (0.0, ramp.run)] + [np.linspace(half, ramp.run - half, 5)])
+    levels = np.concatenate(
+        [edge + np.linspace(-half, half, _EDGE_KNOTS + 1) for edge in (0.0, ramp.run)]
+        + [np.linspace(half, ramp.run - half, 5)]
+    )
     found = []
     for level in levels:
         side = d > level

@@ -11,15 +11,28 @@ from trajopt.world.height_map import LARGEST_GRID, HeightMap
 MESH = 0.15  # m between mesh points; chosen so that sigma 4.5 cm gives about 45 deg (thesis 001, section 4.3)
 
 
-def rough_ground(sigma: float, *, rng: Generator, size: float = 8.0, correlation: float = 0.0,
-                 spacing: float = MESH, flat_radius: float = 0.0) -> HeightMap:
-    """Square of side ``size`` (m) around the origin with normal heights of standard deviation ``sigma`` (m).
+def rough_ground(
+    sigma: float,
+    *,
+    rng: Generator,
+    size: float = 8.0,
+    correlation: float = 0.0,
+    spacing: float = MESH,
+    flat_radius: float = 0.0,
+) -> HeightMap:
+    """Square of side ``size`` (m) around the origin with normal heights of standard deviation
+    ``sigma`` (m).
 
-    ``correlation`` (m): heights correlate as exp(-d^2 / correlation^2); 0 draws each mesh point by itself, as
-    the thesis's mesh. Within ``flat_radius`` (m) of the origin the ground is level, to start on.
-    Raises ArgumentError for a negative sigma, correlation or radius, or a mesh that is empty or huge.
+    ``correlation`` (m): heights correlate as exp(-d^2 / correlation^2); 0 draws each mesh point by
+    itself, as the thesis's mesh. Within ``flat_radius`` (m) of the origin the ground is level, to
+    start on. Raises ArgumentError for a negative sigma, correlation or radius, or a mesh that is
+    empty or huge.
     """
-    for name, value in (("sigma", sigma), ("correlation", correlation), ("flat_radius", flat_radius)):
+    for name, value in (
+        ("sigma", sigma),
+        ("correlation", correlation),
+        ("flat_radius", flat_radius),
+    ):
         if not (np.isfinite(value) and value >= 0):
             raise ArgumentError(name, value, "a finite length >= 0 m")
     if not (np.isfinite(size) and np.isfinite(spacing) and 0 < spacing < size):
@@ -31,7 +44,9 @@ def rough_ground(sigma: float, *, rng: Generator, size: float = 8.0, correlation
     noise = rng.standard_normal((count + 2 * margin, count + 2 * margin))
     if correlation > 0:
         offsets = np.arange(-margin, margin + 1) * spacing
-        kernel = np.exp(-2 * offsets**2 / correlation**2)  # convolved with itself: exp(-d^2/correlation^2)
+        kernel = np.exp(
+            -2 * offsets**2 / correlation**2
+        )  # convolved with itself: exp(-d^2/correlation^2)
         kernel /= np.sqrt(np.sum(kernel**2))
         noise = np.apply_along_axis(np.convolve, 0, noise, kernel, "valid")
         noise = np.apply_along_axis(np.convolve, 1, noise, kernel, "valid")

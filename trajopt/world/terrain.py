@@ -37,9 +37,11 @@ class Flat:
 
 @dataclass(frozen=True)
 class Step:
-    """A step of ``rise`` (m, > 0 up) across the line at distance ``x`` (m) along ``direction`` (rad, world).
+    """A step of ``rise`` (m, > 0 up) across the line at distance ``x`` (m) along ``direction``
+    (rad, world).
 
-    A wheeled robot drives up to it, not over it: a path whose body origin crosses the line is infeasible.
+    A wheeled robot drives up to it, not over it: a path whose body origin crosses the line is
+    infeasible.
     """
 
     rise: float
@@ -63,5 +65,6 @@ class Step:
         beyond = self.height(p[:, 0], p[:, 1]) != self.height(p[:1, 0], p[:1, 1])
         if beyond.any():
             place = float(path.parameter(u[[int(np.argmax(beyond))]])[0])
-            raise InfeasibleError("terrain", place,
-                                  f"the path crosses a step of {self.rise:g} m; end it before")
+            raise InfeasibleError(
+                "terrain", place, f"the path crosses a step of {self.rise:g} m; end it before"
+            )
