@@ -24,7 +24,7 @@ from trajopt.optimize.base import Budget, OptimizeResult
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
-from trajopt.problem import Problem, load_problem, problem_kind
+from trajopt.problem.search import Problem, load_problem, problem_kind
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import argparse
 from pathlib import Path
 
 from benchmarks.common import ROOT
-from trajopt.report.bench import (
+from trajopt.bench.pictures import (
     answer_lines,
     peer_lines,
     run_line,
@@ -20,8 +20,8 @@ from trajopt.report.bench import (
     small_picture,
     write_report,
 )
-from trajopt.study.bench_tables import BenchTables
-from trajopt.study.store import open_store
+from trajopt.bench.tables import BenchTables
+from trajopt.sweeps.store import open_store
 
 PAGE = ROOT / "docs" / "pso_vs_gradient.md"
 PICTURES = ("families", "ecdf", "profiles")

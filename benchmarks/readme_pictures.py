@@ -13,11 +13,11 @@ import tempfile
 from pathlib import Path
 
 from trajopt.pipeline import solve, validate
-from trajopt.problem import load_problem
-from trajopt.report.climb_rates import rate_lines, rate_maps
+from trajopt.problem.search import load_problem
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.style import in_style, save_figure
-from trajopt.study.store import open_store
+from trajopt.sweeps.store import open_store
+from trajopt.systems.smdw.rate_pictures import rate_lines, rate_maps
 
 FOLDER = Path("docs/pictures")
 PROBLEM = Path("problems/smdw/scenario_1_lateral.toml")

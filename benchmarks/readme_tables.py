@@ -1,8 +1,8 @@
 """Tables of README.md from the last benchmark runs: `python -m benchmarks.readme_tables`.
 
-Run first: `python -m benchmarks.optimizers`, `python -m benchmarks.time_scaling`, `python -m
-benchmarks.swarm_speed`, `python -m benchmarks.climb` with both engines, `python -m
-benchmarks.closed_loop`. The tables stand between markers in README.md.
+Run first: `python -m benchmarks.optimizers`, `python -m benchmarks.peers.time_scaling`, `python -m
+benchmarks.peers.swarm_speed`, `python -m benchmarks.theses.climb` with both engines, `python -m
+benchmarks.theses.closed_loop`. The tables stand between markers in README.md.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.climb import SOURCES, THESIS
-from benchmarks.closed_loop import SETTINGS
-from trajopt.simulate.climb import wilson
+from benchmarks.theses.climb import SOURCES, THESIS
+from benchmarks.theses.closed_loop import SETTINGS
+from trajopt.systems.smdw.climb import wilson
 
 README, RESULTS, WHOLE = Path("README.md"), Path("out/benchmarks"), Path("docs/optimizers.md")
 START, END = "<!-- tables: python -m benchmarks.readme_tables -->", "<!-- end of tables -->"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from trajopt.problem import Problem, load_problem, problem_kind
+from trajopt.problem.search import Problem, load_problem, problem_kind
 
 ROOT = Path(__file__).parent.parent
 SMDW = sorted(

@@ -26,21 +26,21 @@ if TYPE_CHECKING:
     from trajopt.limits.wheel_acceleration import WheelAcceleration
     from trajopt.limits.wheel_speed import WheelSpeed
     from trajopt.limits.yaw_rate import YawRate
-    from trajopt.maneuver import plan_climb
-    from trajopt.maneuver_problem import load_maneuver
     from trajopt.optimize.base import Budget, OptimizeResult, Status
     from trajopt.optimize.search import minimize
-    from trajopt.path_problem import load_path_problem
     from trajopt.paths.path import Path
     from trajopt.pipeline import Solution, solve, time_path, validate
-    from trajopt.problem import Problem, load_problem
-    from trajopt.refine import limit_jerk
-    from trajopt.refine_path import optimize_path
-    from trajopt.refine_profile import follow
+    from trajopt.problem.given_path import load_path_problem
+    from trajopt.problem.search import Problem, load_problem
+    from trajopt.refine.jerk import limit_jerk
+    from trajopt.refine.path import optimize_path
+    from trajopt.refine.profile import follow
     from trajopt.robots.loc8 import loc8
     from trajopt.robots.powerbot import powerbot
     from trajopt.simulate.check import ValidationReport
-    from trajopt.study.sweeps import sweep
+    from trajopt.sweeps.sweeps import sweep
+    from trajopt.systems.smdw.planner import plan_climb
+    from trajopt.systems.smdw.problem import load_maneuver
     from trajopt.timing.scaling import time_scale
     from trajopt.timing.trajectory import State, Trajectory
     from trajopt.world.terrain import Flat, Step
@@ -57,7 +57,7 @@ _HOME = {
     "MissingDependencyError": "trajopt.errors",
     "OptimizeResult": "trajopt.optimize.base",
     "Path": "trajopt.paths.path",
-    "Problem": "trajopt.problem",
+    "Problem": "trajopt.problem.search",
     "ProblemError": "trajopt.errors",
     "SimulationError": "trajopt.errors",
     "Slip": "trajopt.limits.slip",
@@ -74,18 +74,18 @@ _HOME = {
     "WheelAcceleration": "trajopt.limits.wheel_acceleration",
     "WheelSpeed": "trajopt.limits.wheel_speed",
     "YawRate": "trajopt.limits.yaw_rate",
-    "follow": "trajopt.refine_profile",
-    "limit_jerk": "trajopt.refine",
-    "load_maneuver": "trajopt.maneuver_problem",
-    "load_path_problem": "trajopt.path_problem",
-    "load_problem": "trajopt.problem",
+    "follow": "trajopt.refine.profile",
+    "limit_jerk": "trajopt.refine.jerk",
+    "load_maneuver": "trajopt.systems.smdw.problem",
+    "load_path_problem": "trajopt.problem.given_path",
+    "load_problem": "trajopt.problem.search",
     "loc8": "trajopt.robots.loc8",
     "minimize": "trajopt.optimize.search",
-    "optimize_path": "trajopt.refine_path",
-    "plan_climb": "trajopt.maneuver",
+    "optimize_path": "trajopt.refine.path",
+    "plan_climb": "trajopt.systems.smdw.planner",
     "powerbot": "trajopt.robots.powerbot",
     "solve": "trajopt.pipeline",
-    "sweep": "trajopt.study.sweeps",
+    "sweep": "trajopt.sweeps.sweeps",
     "time_path": "trajopt.pipeline",
     "time_scale": "trajopt.timing.scaling",
     "validate": "trajopt.pipeline",

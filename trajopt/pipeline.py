@@ -15,9 +15,9 @@ from trajopt.objectives.duration import DurationObjective
 from trajopt.objectives.terminal import TerminalObjective, folded, terminal_objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult
 from trajopt.optimize.search import minimize
-from trajopt.path_problem import PathProblem
 from trajopt.paths.path import Path
-from trajopt.problem import Problem
+from trajopt.problem.given_path import PathProblem
+from trajopt.problem.search import Problem
 from trajopt.robots.actuator import Actuator
 from trajopt.simulate.check import ValidationReport, drive_trajectory
 from trajopt.timing.nominal import nominal_timing

@@ -10,7 +10,7 @@ import pytest
 
 from trajopt.objectives.rollout import roll_out, step_grid
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective, with_free
-from trajopt.problem import Problem, load_problem
+from trajopt.problem.search import Problem, load_problem
 
 pytest.importorskip("numba")
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from trajopt.bench.peers import equal_pyswarms
+from trajopt.bench.profiles import holm, no_worse
 from trajopt.optimize.base import Budget, Optimizer
 from trajopt.optimize.pso import constriction
 from trajopt.optimize.search import minimize
-from trajopt.study.peers import equal_pyswarms
-from trajopt.study.profiles import holm, no_worse
 
 pytest.importorskip("pyswarms")
 

@@ -12,7 +12,7 @@ from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import Lattice, lattice_points
 from trajopt.optimize.pso import thesis_enhanced, thesis_first
 from trajopt.optimize.search import minimize
-from trajopt.problem import WHEELS
+from trajopt.problem.search import WHEELS
 
 SOLVABLE = [name for name in SMDW if name != "table_5_3_1s"]
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from trajopt.bench.problems import objective_named
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.objectives.base import Evaluation
 from trajopt.optimize.base import Budget, Run, Starts, Status
@@ -18,7 +19,6 @@ from trajopt.optimize.hybrid import Hybrid
 from trajopt.optimize.pso import ParticleSwarm
 from trajopt.optimize.scipy import ScipyLocal
 from trajopt.optimize.search import minimize, optimizer_names
-from trajopt.study.bench_problems import objective_named
 
 BOX = np.array([[-2.0, 3.0], [-1.5, 2.5]])
 LINE_SEARCH = (

@@ -9,7 +9,7 @@ import pytest
 
 import trajopt
 from trajopt.pipeline import Solution
-from trajopt.problem import Problem
+from trajopt.problem.search import Problem
 from trajopt.simulate.check import ValidationReport
 from trajopt.simulate.engine import Recording
 

@@ -14,9 +14,9 @@ from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
-from trajopt.report.powerbot import draw_path, draw_profiles, draw_replan, draw_safe_speed
 from trajopt.report.timing import draw_growth, growth_exponent
 from trajopt.robots.powerbot import powerbot
+from trajopt.systems.powerbot.pictures import draw_path, draw_profiles, draw_replan, draw_safe_speed
 from trajopt.timing.scaling import time_scale
 
 POINTS = (100, 1000, 10_000)

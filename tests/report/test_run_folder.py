@@ -20,7 +20,7 @@ from tests.report.conftest import problem_file
 from trajopt.errors import ArgumentError, MissingDependencyError, ProblemError
 from trajopt.optimize.search import optimizer_names
 from trajopt.pipeline import Solution
-from trajopt.problem import WHEELS
+from trajopt.problem.search import WHEELS
 from trajopt.report.files import as_toml, finite
 from trajopt.report.provenance import commit, versions
 from trajopt.report.run_folder import (

@@ -13,17 +13,6 @@ from hypothesis import strategies as st
 
 from trajopt.errors import ArgumentError
 from trajopt.optimize.ipopt import numpy_on_symbols
-from trajopt.robots.asoc import (
-    AsocGeometry,
-    asoc_platform,
-    link_velocities,
-    module_inverse,
-    module_jacobian,
-    wheel_frame,
-    wheel_positions,
-    wheel_steering,
-)
-from trajopt.robots.asoc import steering_rates as module_rates
 from trajopt.robots.mobility import (
     admissible_at,
     forward_at,
@@ -38,6 +27,17 @@ from trajopt.robots.mobility import (
 from trajopt.robots.named import NAMED, differential, four_mecanum, platform_named, two_steer
 from trajopt.robots.platform import Body, Platform
 from trajopt.robots.wheel import Wheel, WheelKind
+from trajopt.systems.asoc.modules import (
+    AsocGeometry,
+    asoc_platform,
+    link_velocities,
+    module_inverse,
+    module_jacobian,
+    wheel_frame,
+    wheel_positions,
+    wheel_steering,
+)
+from trajopt.systems.asoc.modules import steering_rates as module_rates
 
 ANGLE = st.floats(-3.0, 3.0)
 RATE = st.floats(-2.0, 2.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from trajopt.simulate.engine import SimRobot
-from trajopt.simulate.loc8_model import loc8_mecanum
+from trajopt.systems.smdw.loc8_model import loc8_mecanum
 
 
 @pytest.fixture(scope="session")

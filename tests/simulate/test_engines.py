@@ -10,11 +10,11 @@ import pytest
 
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.simulate.engine import ENGINES, Command, Recording, SimRobot, make_engine
-from trajopt.simulate.loc8_model import loc8_mecanum
 from trajopt.simulate.mujoco import MuJoCo
 from trajopt.simulate.scene import Ramp, Scene, Step
-from trajopt.simulate.smdw_wheel import loc8_smdw
 from trajopt.simulate.straight import DIRECTIONS, deviation, straight_command
+from trajopt.systems.smdw.loc8_model import loc8_mecanum
+from trajopt.systems.smdw.wheel import loc8_smdw
 
 pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")

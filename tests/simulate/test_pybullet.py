@@ -11,10 +11,10 @@ import pytest
 
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.simulate.engine import Camera, Command, Observation, SimRobot
-from trajopt.simulate.loc8_model import loc8_mecanum
 from trajopt.simulate.pybullet import PyBullet
 from trajopt.simulate.scene import Scene, Step
 from trajopt.simulate.straight import DIRECTIONS, deviation, straight_command
+from trajopt.systems.smdw.loc8_model import loc8_mecanum
 
 pytest.importorskip("pybullet")
 SPEED = 3.0 / 3.6  # m/s, the thesis's 3 km/h

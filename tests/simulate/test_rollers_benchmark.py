@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.rollers import HEADER, SPEEDS, Case, Row, cases, measure, summary, write
+from benchmarks.theses.rollers import HEADER, SPEEDS, Case, Row, cases, measure, summary, write
 from trajopt.simulate.engine import ENGINES
 from trajopt.simulate.rollers import SHAPES
 

@@ -9,10 +9,10 @@ import pytest
 
 from trajopt.errors import ArgumentError
 from trajopt.robots.loc8 import WHEEL_MASS
-from trajopt.robots.smdw_geometry import DoubleWheel, support_down
 from trajopt.simulate.pybullet import MAX_JOINTS
 from trajopt.simulate.rollers import RollerWheel, Shape, outline_point, support_height
-from trajopt.simulate.smdw_wheel import loc8_smdw, smdw_wheel
+from trajopt.systems.smdw.geometry import DoubleWheel, support_down
+from trajopt.systems.smdw.wheel import loc8_smdw, smdw_wheel
 
 SIZES = DoubleWheel()
 ROUND = np.linspace(-math.pi, math.pi, 3601)

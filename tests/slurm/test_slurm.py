@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.study.crashes import cases, digest, torment_slurm
-from tests.study.run_functions import paced, paced_mixed
-from tests.study.same_table import swept
-from trajopt.study.host import CaseLimits
-from trajopt.study.slurm import SlurmOptions, submit
-from trajopt.study.store import open_store
-from trajopt.study.sweeps import tabled
+from tests.sweeps.crashes import cases, digest, torment_slurm
+from tests.sweeps.run_functions import paced, paced_mixed
+from tests.sweeps.same_table import swept
+from trajopt.sweeps.host import CaseLimits
+from trajopt.sweeps.slurm import SlurmOptions, submit
+from trajopt.sweeps.store import open_store
+from trajopt.sweeps.sweeps import tabled
 
 LIMITS = CaseLimits(60.0, 0)
 
@@ -93,5 +93,5 @@ def test_a_requeued_element_goes_on(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_killed_elements_and_submitters(tmp_path: Path) -> None:
-    """The short form of ``python -m tests.study.crashes --engine slurm``."""
+    """The short form of ``python -m tests.sweeps.crashes --engine slurm``."""
     assert torment_slurm(4, 300, 3, tmp_path).faults == []

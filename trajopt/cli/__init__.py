@@ -8,8 +8,9 @@ import sys
 import typer
 from rich.console import Console
 
-from trajopt.cli import bench, maneuvers, paths, search, sweep
+from trajopt.cli import bench, paths, search, sweep
 from trajopt.errors import TrajoptError
+from trajopt.systems.smdw import commands
 
 app = typer.Typer(
     add_completion=False,
@@ -20,8 +21,8 @@ app = typer.Typer(
 for command in (
     search.solve,
     search.validate,
-    maneuvers.plan,
-    maneuvers.climb,
+    commands.plan,
+    commands.climb,
     paths.explain,
     paths.export,
     paths.compare,

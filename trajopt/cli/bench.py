@@ -17,12 +17,12 @@ from rich.progress import (
 )
 
 if TYPE_CHECKING:
-    from trajopt.study.drive import Progress as SweepProgress
+    from trajopt.sweeps.drive import Progress as SweepProgress
 
 console = Console()
 
 RUN = "run"
-BEST_KNOWN = Path("trajopt") / "study" / "best_known.json"  # in a checkout
+BEST_KNOWN = Path("trajopt") / "bench" / "best_known.json"  # in a checkout
 
 
 class _FileFirst(typer.core.TyperGroup):
@@ -62,7 +62,7 @@ def run(
     ] = False,
 ) -> None:
     """Run every search that has no row yet; started again after any interruption, it goes on."""
-    from trajopt.study.bench import load_bench, run_bench
+    from trajopt.bench.comparison import load_bench, run_bench
 
     plan = load_bench(bench_file, plugin or ())
     place = store or default_store(bench_file)
@@ -98,8 +98,8 @@ def report(
     ] = None,
 ) -> None:
     """Write the page: tables (Markdown, CSV), profiles (PNG, SVG) and the answers in words."""
-    from trajopt.report.bench import write_report
-    from trajopt.study.store import open_store
+    from trajopt.bench.pictures import write_report
+    from trajopt.sweeps.store import open_store
 
     page = write_report(open_store(store, create=False), out or store / "report")
     console.print(f"written to {page}", highlight=False, soft_wrap=True)
@@ -113,8 +113,8 @@ def best(
     file: Annotated[Path, typer.Option("--file", help="JSON file to merge into")] = BEST_KNOWN,
 ) -> None:
     """Keep the best costs of a benchmark, with who found them, in the file of best known values."""
-    from trajopt.study.bench import write_best_known
-    from trajopt.study.store import open_store
+    from trajopt.bench.comparison import write_best_known
+    from trajopt.sweeps.store import open_store
 
     known = write_best_known(open_store(store, create=False), file)
     console.print(f"{len(known)} problems in {file}")

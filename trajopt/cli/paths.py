@@ -94,9 +94,9 @@ def compare(
 
 def _timed(plan: Path, set_: list[str] | None, engine: str) -> Trajectory:
     """The timed motion of a problem file of either kind, or of a run folder."""
-    from trajopt.path_problem import load_path_problem
     from trajopt.pipeline import solve, time_path
-    from trajopt.problem import load_problem, problem_kind
+    from trajopt.problem.given_path import load_path_problem
+    from trajopt.problem.search import load_problem, problem_kind
 
     timed_here = not plan.is_dir() and problem_kind(plan) == "path"
     if engine != "auto" and not timed_here:

@@ -51,7 +51,7 @@ def solve(
 ) -> None:
     """Search control points, time the path, and write what was found."""
     from trajopt.pipeline import solve as solve_problem
-    from trajopt.problem import load_problem
+    from trajopt.problem.search import load_problem
     from trajopt.report.tables import solution_table
 
     loaded = load_problem(problem, overrides(set_))
@@ -120,7 +120,7 @@ def schema(
     ] = None,
 ) -> None:
     """Print the JSON schema of problem files, for editors."""
-    from trajopt.problem import problem_schema
+    from trajopt.problem.search import problem_schema
 
     if out is None:
         sys.stdout.write(problem_schema())

@@ -19,10 +19,10 @@ from trajopt.errors import ArgumentError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from trajopt.study.drive import Progress
-    from trajopt.study.engines import Engine
-    from trajopt.study.store import Store
-    from trajopt.study.sweepfile import SweepPlan
+    from trajopt.sweeps.drive import Progress
+    from trajopt.sweeps.executors import Engine
+    from trajopt.sweeps.store import Store
+    from trajopt.sweeps.sweepfile import SweepPlan
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -62,7 +62,7 @@ def run(
     ] = False,
 ) -> None:
     """Run every case that has no row yet."""
-    from trajopt.study.sweepfile import load_sweep
+    from trajopt.sweeps.sweepfile import load_sweep
 
     plan = load_sweep(sweep_file)
     if dry_run:
@@ -85,7 +85,7 @@ def retry_failed(
     host: Host = "127.0.0.1",
 ) -> None:
     """Run cases again that failed, timed out or crashed, and those without a row."""
-    from trajopt.study.sweepfile import load_sweep
+    from trajopt.sweeps.sweepfile import load_sweep
 
     _go(
         load_sweep(sweep_file),
@@ -109,11 +109,11 @@ def submit(
     failed: Annotated[bool, typer.Option("--retry-failed", help="failed cases too")] = False,
 ) -> None:
     """Hand the missing cases to Slurm and return; nothing here needs to stay alive."""
-    from trajopt.study.host import CaseLimits
-    from trajopt.study.slurm import SlurmOptions
-    from trajopt.study.slurm import submit as hand_over
-    from trajopt.study.store import open_store
-    from trajopt.study.sweepfile import load_sweep
+    from trajopt.sweeps.host import CaseLimits
+    from trajopt.sweeps.slurm import SlurmOptions
+    from trajopt.sweeps.slurm import submit as hand_over
+    from trajopt.sweeps.store import open_store
+    from trajopt.sweeps.sweepfile import load_sweep
 
     if not slurm:
         raise ArgumentError("--slurm", False, "--slurm: job arrays are submitted to Slurm only")
@@ -140,7 +140,7 @@ def submit(
 @app.command()
 def status(store: StorePath) -> None:
     """Cases by status, the last runs, and the commonest errors."""
-    from trajopt.study.store import open_store
+    from trajopt.sweeps.store import open_store
 
     place = open_store(store, create=False)
     counts, runs = place.counts(), place.runs()
@@ -173,7 +173,7 @@ def show(
     store: StorePath, case: Annotated[str, typer.Argument(help="first digits of a case")]
 ) -> None:
     """One case: its values, results, arrays, and the traceback of its error."""
-    from trajopt.study.store import open_store
+    from trajopt.sweeps.store import open_store
 
     row, arrays = open_store(store, create=False).case(case)
     shown = Table("name", "value", title=f"case {row['case']}", title_justify="left")
@@ -198,7 +198,7 @@ def report(
     store: StoreOption = None,
 ) -> None:
     """Draw the pictures of one case out of a sweep, or of a folder that solve wrote, again."""
-    from trajopt.study.store import open_store
+    from trajopt.sweeps.store import open_store
 
     if not case:
         from trajopt.report.pictures import save_pictures
@@ -207,7 +207,7 @@ def report(
         files = list(save_pictures(read_solution(source), out or source))
     else:
         from trajopt.report.sweep_case import report_case
-        from trajopt.study.sweepfile import load_sweep
+        from trajopt.sweeps.sweepfile import load_sweep
 
         plan = None if source.is_dir() else load_sweep(source)
         place = source if plan is None else store or _default_store(source)
@@ -221,7 +221,7 @@ def report(
 @app.command()
 def compact(store: StorePath) -> None:
     """Merge the parts of a store into large ones."""
-    from trajopt.study.store import open_store
+    from trajopt.sweeps.store import open_store
 
     before, after = open_store(store, create=False).compact()
     console.print(f"{before} parts before, {after} after")
@@ -232,7 +232,7 @@ def export(
     store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]
 ) -> None:
     """Write all rows, one a case, to one file."""
-    from trajopt.study.store import open_store
+    from trajopt.sweeps.store import open_store
 
     place = open_store(store, create=False)
     match out.suffix:
@@ -270,8 +270,8 @@ def plot(
 
 
 def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> None:
-    from trajopt.study.store import open_store
-    from trajopt.study.sweeps import missing, sweep
+    from trajopt.sweeps.store import open_store
+    from trajopt.sweeps.sweeps import missing, sweep
 
     place = open_store(store)
     left = len(missing(plan.table, place, retry_failed=retry_failed))
@@ -301,9 +301,9 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
 
     import numpy as np
 
-    from trajopt.study.drive import sampled
-    from trajopt.study.engines import available_processors
-    from trajopt.study.sweeps import sweep
+    from trajopt.sweeps.drive import sampled
+    from trajopt.sweeps.executors import available_processors
+    from trajopt.sweeps.sweeps import sweep
 
     console.print(f"{plan.title}: {len(plan.table)} cases")
     first = plan.table.take(np.arange(min(_SHOWN, len(plan.table)))).rows()
@@ -355,7 +355,7 @@ def _default_store(sweep_file: Path) -> Path:
 
 
 def _engine(name: str, workers: int, host: str) -> Engine:
-    from trajopt.study import engines
+    from trajopt.sweeps import executors as engines
 
     count = workers or engines.available_processors()
     if name == "processes":

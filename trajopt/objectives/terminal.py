@@ -22,7 +22,7 @@ from trajopt.objectives.exact import exact_terminal
 from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
 from trajopt.paths.path import Path
 from trajopt.paths.spline import SplineBasis, uniform_basis
-from trajopt.problem import Problem
+from trajopt.problem.search import Problem
 from trajopt.robots.actuator import Actuator
 from trajopt.robots.catalogue import robot_named
 from trajopt.robots.platform import Platform

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Polygon, Rectangle
 from numpy.typing import NDArray
 
-from trajopt.problem import WHEELS, Problem
+from trajopt.problem.search import WHEELS, Problem
 from trajopt.report.style import BLACK, GREY, LIGHT
 from trajopt.robots.platform import Platform
 

@@ -23,7 +23,7 @@ from trajopt.objectives.terminal import TerminalObjective, swarm_engine, termina
 from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
 from trajopt.pipeline import Solution
-from trajopt.problem import WHEELS, Problem, load_problem
+from trajopt.problem.search import WHEELS, Problem, load_problem
 from trajopt.report.files import as_toml, made_folder, read_json, write_json, write_text
 from trajopt.report.provenance import commit, run_facts, versions
 from trajopt.timing.trajectory import Trajectory

@@ -17,13 +17,13 @@ from trajopt.report.files import made_folder, write_json
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.run_folder import write_solution, write_validation
 from trajopt.report.style import in_style, legend_beside, new_figure, save_figure
-from trajopt.study.cases import Case
-from trajopt.study.problem_run import ProblemRun
-from trajopt.study.rows import DONE
+from trajopt.sweeps.cases import Case
+from trajopt.sweeps.problem_run import ProblemRun
+from trajopt.sweeps.rows import DONE
 
 if TYPE_CHECKING:
-    from trajopt.study.store import Store
-    from trajopt.study.sweepfile import SweepPlan
+    from trajopt.sweeps.store import Store
+    from trajopt.sweeps.sweepfile import SweepPlan
 
 _SAME = 1e-9  # relative; a case solved again must cost what its row says, on any processor. chosen
 _MOST_ARRAYS, _MOST_LINES = 8, 8  # panels of arrays.png and lines in one of them; chosen

@@ -14,9 +14,9 @@ from types import MappingProxyType
 import numpy as np
 
 from trajopt.errors import ArgumentError
-from trajopt.robots.asoc import AsocGeometry, asoc_platform
 from trajopt.robots.platform import Body, Platform, differential_platform, mecanum_platform
 from trajopt.robots.wheel import Wheel, WheelKind, fixed_wheel
+from trajopt.systems.asoc.modules import AsocGeometry, asoc_platform
 
 RADIUS = 0.10  # m, wheels; chosen
 HALF_LENGTH = 0.30  # m, half wheelbase; chosen

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from trajopt.control.approach import Mode, approach_controller
 from trajopt.errors import ArgumentError, SimulationError
-from trajopt.problem import Problem
+from trajopt.problem.search import Problem
 from trajopt.robots.catalogue import robot_named
-from trajopt.simulate.approach_run import SETTLE, steered
 from trajopt.simulate.engine import Camera, Command, Controller, Recording, make_engine
-from trajopt.simulate.loc8_model import loc8_mecanum
 from trajopt.simulate.scene import Scene
+from trajopt.systems.smdw.approach_run import SETTLE, steered
+from trajopt.systems.smdw.loc8_model import loc8_mecanum
 from trajopt.timing.trajectory import Trajectory
 
 Array = NDArray[np.float64]

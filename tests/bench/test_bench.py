@@ -1,0 +1,285 @@
+"""The optimizer benchmark: plugins, bad objectives, resuming, the report, and the profiles'
+definitions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from trajopt.bench.comparison import BenchPlan, best_costs, load_bench, run_bench
+from trajopt.bench.pictures import write_report
+from trajopt.bench.problems import bench_problem
+from trajopt.bench.profiles import (
+    data_profile,
+    ecdf,
+    expected_running_time,
+    no_worse,
+    performance_profile,
+    time_to_targets,
+)
+from trajopt.bench.tables import BenchTables
+from trajopt.cli.bench import app
+from trajopt.errors import ArgumentError
+from trajopt.optimize.base import Budget
+from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
+
+PLUGIN = str(Path(__file__).parent / "bench_plugin.py")
+INF, NAN = np.inf, np.nan
+
+
+def test_an_optimizer_in_a_file_works_by_its_path() -> None:
+    for name in (PLUGIN, f"{PLUGIN}:random-search"):
+        found = minimize(
+            lambda x: float(np.sum(x * x)), [[-1.0, 2.0]] * 2, optimizer=name, budget=Budget(400)
+        )
+        assert found.optimizer == "random-search"
+        assert found.fun < 0.1
+    with pytest.raises(ArgumentError, match="random-search"):
+        optimizer_named(f"{PLUGIN}:nothing")
+    with pytest.raises(ArgumentError, match="existing Python file"):
+        optimizer_named("no/such/file.py")
+
+
+def test_an_optimizer_of_an_installed_package_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    from trajopt.optimize import plugins, search
+
+    made = optimizer_named(PLUGIN)
+    monkeypatch.setattr(search, "installed_optimizers", lambda: {"theirs": lambda: made})
+    assert "theirs" in optimizer_names()
+    assert optimizer_named("theirs") is made
+    assert isinstance(plugins.installed_optimizers(), dict)
+
+
+@pytest.fixture(scope="module")
+def bad_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    kinds = (
+        "raises",
+        "hangs",
+        "returns NaN",
+        "returns inf",
+        "wrong shape",
+        "changes its argument",
+        "good",
+    )
+    plan = BenchPlan(
+        "bad",
+        tuple(f"bad/{kind}" for kind in kinds),
+        ("pso", "random-search"),
+        seeds=2,
+        evaluations=200,
+        seconds=2.0,
+        time_limit=3.0,
+        plugins=(PLUGIN,),
+    )
+    store = tmp_path_factory.mktemp("bench") / "rows"
+    run_bench(replace(plan, problems=plan.problems[:1]), store, jobs=2)
+    run_bench(plan, store, jobs=2)  # goes on: the finished ones are not run again
+    return store
+
+
+@pytest.mark.slow
+def test_bad_objectives_ruin_neither_the_run_nor_other_rows(bad_store: Path) -> None:
+    from trajopt.sweeps.store import open_store
+
+    store = open_store(bad_store, create=False)
+    frame = store.frame()
+    assert len(frame) == 7 * 2 * 2
+    status = frame.groupby("problem")["status"].unique()
+    assert list(status["bad/hangs"]) == ["timeout"]
+    good = frame[frame.problem.isin(["bad/good", "bad/changes its argument"])]
+    assert (good.status == "done").all()
+    assert (good.cost < 0.2).all()
+    for kind in ("raises", "returns NaN", "returns inf", "wrong shape"):
+        rows = frame[frame.problem == f"bad/{kind}"]
+        assert all(
+            "on purpose" in str(r.first_failure) or r.failures > 0 or r.status == "error"
+            for r in rows.itertuples()
+        )
+    page = write_report(store, bad_store.parent / "page").read_text()
+    for kind in ("raises", "hangs", "returns NaN", "wrong shape"):
+        assert f"| bad/{kind} |" in page.split("Searches that failed")[1]
+    for name in (
+        "ecdf.png",
+        "ecdf.svg",
+        "profiles.png",
+        "profiles.svg",
+        "searches.csv",
+        "shares.csv",
+    ):
+        assert (bad_store.parent / "page" / name).stat().st_size > 0
+
+
+@pytest.mark.slow
+def test_the_command_line_runs_resumes_and_reports(tmp_path: Path) -> None:
+    file = tmp_path / "mini.toml"
+    file.write_text(
+        'seeds = 2\nevaluations = 300\nseconds = 2.0\nproblems = ["smdw/scenario_1_lateral/p2"]\n'
+        'optimizers = ["lattice", "pso"]\n'
+    )
+    arguments = [str(file), "--store", str(tmp_path / "rows")]
+    for _ in range(2):
+        result = CliRunner().invoke(app, arguments)
+        assert result.exit_code == 0, result.output
+        assert "3 done" in result.output
+    reported = CliRunner().invoke(
+        app, ["report", str(tmp_path / "rows"), "--out", str(tmp_path / "page")]
+    )
+    assert reported.exit_code == 0, reported.output
+    assert "lattice" in (tmp_path / "page" / "index.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("optimizers = ['pso']", "problems"),
+        ("problems = ['x']\noptimizers = []", "optimizers"),
+        ("problems = ['x']\noptimizers = ['pso']\nseedz = 3", "seedz"),
+        ("problems = ['x']\noptimizers = ['pso']\nseeds = -1", "seeds"),
+        ("= nonsense", "bench file"),
+    ],
+)
+def test_bench_files_name_the_wrong_key(tmp_path: Path, text: str, wanted: str) -> None:
+    (tmp_path / "b.toml").write_text(text)
+    with pytest.raises(ArgumentError, match=wanted):
+        load_bench(tmp_path / "b.toml")
+
+
+def test_the_shipped_bench_file_names_existing_problems_and_optimizers() -> None:
+    pytest.importorskip("pymoo")
+    pytest.importorskip("optimagic")
+    pytest.importorskip("cma")
+    pytest.importorskip("nlopt")
+    plan = load_bench(Path(__file__).parents[2] / "benchmarks" / "pso_vs_gradient.toml")
+    assert len(plan.optimizers) >= 8
+    assert plan.seeds >= 15
+    assert {case["problem"] for case in plan.cases()} == set(plan.problems)
+
+
+def test_problem_names() -> None:
+    a, b = bench_problem("random-smdw/1/p2"), bench_problem("random-smdw/2/p2")
+    x = np.full((1, 2), 0.5)
+    assert a.objective.evaluate(x).cost != b.objective.evaluate(x).cost
+    assert (
+        bench_problem("random-smdw/1/p2").objective.evaluate(x).cost == a.objective.evaluate(x).cost
+    )
+    for wrong in (
+        "nothing/x",
+        "smdw/scenario_1_lateral",
+        "classical/ackley-x",
+        "smdw/scenario_1_lateral/p2/nolimits",
+    ):
+        with pytest.raises(ArgumentError, match="problem"):
+            bench_problem(wrong)
+
+
+# -- profiles
+# ---------------------------------------------------------------------------------------------
+
+
+def test_time_to_targets() -> None:
+    assert time_to_targets([1, 5, 9], [4.0, 2.0, 1.0], [5.0, 2.0, 1.5, 0.5]).tolist() == [
+        1.0,
+        5.0,
+        9.0,
+        INF,
+    ]
+    assert time_to_targets([], [], [1.0]).tolist() == [INF]
+
+
+def test_data_profile_counts_simplex_gradients() -> None:
+    times = np.array(
+        [[[3.0, INF], [30.0, 6.0]], [[8.0, 8.0], [NAN, NAN]]]
+    )  # 2 problems, 2 optimizers, 2 seeds
+    profile = data_profile(times, [2, 3], [1.0, 2.0, 10.0])  # divided by 3 and 4
+    assert profile[:, 0].tolist() == [0.25, 0.75, 0.75]
+    assert profile[:, 1].tolist() == [0.0, 0.5, 1.0]
+
+
+def test_performance_profile_is_relative_to_the_fastest() -> None:
+    times = np.array([[[2.0], [4.0]], [[9.0], [3.0]], [[INF], [INF]], [[INF], [1.0]]])
+    profile = performance_profile(times, [1.0, 2.0, 3.0])
+    assert profile[:, 0].tolist() == [0.25, 0.25, 0.5]
+    assert profile[:, 1].tolist() == [0.5, 0.75, 0.75]
+
+
+def test_ecdf_counts_all_targets() -> None:
+    times = np.array(
+        [[[[1.0, 10.0], [2.0, INF]]]]
+    )  # one problem, one optimizer, two seeds, two targets
+    assert ecdf(times, [1.0, 2.0, 100.0])[:, 0].tolist() == [0.25, 0.5, 0.75]
+
+
+def test_expected_running_time_and_its_interval() -> None:
+    found = expected_running_time(
+        [10.0, INF, 20.0, INF], [10.0, 100.0, 20.0, 100.0], np.random.default_rng(0)
+    )
+    assert found.value == pytest.approx(230.0 / 2)
+    assert found.low <= found.value <= found.high
+    assert (found.successes, found.runs) == (2, 4)
+    never = expected_running_time([INF], [5.0], np.random.default_rng(0))
+    assert never.value == INF
+    sure = expected_running_time([7.0] * 10, [7.0] * 10, np.random.default_rng(0))
+    assert (sure.low, sure.value, sure.high) == (7.0, 7.0, 7.0)
+
+
+def test_rank_sum_test_sees_what_is_worse() -> None:
+    rng = np.random.default_rng(3)
+    low, high = rng.normal(0.0, 1.0, 30), rng.normal(2.0, 1.0, 30)
+    assert no_worse(high, low) < 1e-4
+    assert no_worse(low, high) > 0.5
+
+
+def test_best_costs_take_known_and_found_values() -> None:
+    def row(cost: float, known: float, feasible: bool = True) -> dict[str, object]:
+        return {
+            "problem": "a",
+            "optimizer": "o",
+            "seed": 1,
+            "status": "done",
+            "cost": cost,
+            "best": known,
+            "feasible": feasible,
+        }
+
+    assert best_costs([row(2.0, NAN), row(1.0, NAN), row(0.1, NAN, False)])["a"] == (
+        1.0,
+        "o, seed 1",
+    )
+    assert best_costs([row(2.0, 0.5)])["a"] == (0.5, "best_known.json")
+    with pytest.raises(ArgumentError, match="finished"):
+        BenchTables([{**row(1.0, NAN), "status": "error"}])
+
+
+def test_best_known_values_are_kept_with_who_found_them(tmp_path: Path) -> None:
+    import json
+
+    from trajopt.bench.comparison import write_best_known
+
+    plan = BenchPlan("best", ("random-smdw/7/p2/limits",), ("pso",), seeds=2, evaluations=300)
+    store = run_bench(plan, tmp_path / "rows")
+    file = tmp_path / "best.json"
+    known = write_best_known(store, file)["random-smdw/7/p2/limits"]
+    assert known["cost"] == store.frame().cost.min()
+    assert known["found_by"].startswith("pso, seed ")
+    objective = bench_problem("random-smdw/7/p2/limits").objective
+    assert objective.score(np.array(known["x"])).cost[0] == known["cost"]
+    file.write_text(
+        json.dumps({"random-smdw/7/p2/limits": {"cost": -1.0, "found_by": "someone", "x": []}})
+    )
+    assert write_best_known(store, file)["random-smdw/7/p2/limits"]["found_by"] == "someone"
+
+
+def test_other_seconds_for_costly_problems(tmp_path: Path) -> None:
+    file = tmp_path / "b.toml"
+    text = 'problems = ["corridor/1/duration", "classical/ackley-2"]\noptimizers = ["pso"]\nseeds = 1\nseconds = 0.1\n'
+    file.write_text(text + '[longer]\n"corridor/" = 0.6\n')
+    frame = run_bench(load_bench(file), tmp_path / "rows").frame().set_index("problem")
+    assert 0.6 <= frame.seconds["corridor/1/duration"] < 0.9
+    assert frame.seconds["classical/ackley-2"] < 0.3
+    file.write_text(text + '[longer]\n"corridor/" = -1\n')
+    with pytest.raises(ArgumentError, match="longer"):
+        load_bench(file)

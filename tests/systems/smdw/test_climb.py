@@ -1,0 +1,128 @@
+"""Climb trials: interval, judgement and bookkeeping; one climb and one that cannot be, in
+MuJoCo."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+from trajopt.errors import ArgumentError
+from trajopt.problem.search import WHEELS
+from trajopt.simulate.engine import Recording
+from trajopt.systems.smdw.climb import (
+    Climb,
+    Outcome,
+    StepScene,
+    climb_all,
+    judge,
+    rate,
+    run_climb,
+    wilson,
+)
+from trajopt.systems.smdw.planner import Plan, configurations, plan_configuration
+from trajopt.systems.smdw.problem import load_maneuver
+
+FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"
+STEP = StepScene(0.05, (2.856, 0.76), 0.0, 0.8, 8.0, 0.047, 0.045, 0.03)
+CLIMB = Climb(STEP, (2.46, 0.76, -math.pi / 2), (0.0,) * 4, (0.0, 1.0), (0, 2), (0.02, 0.02))
+
+
+@pytest.mark.parametrize(("k", "n"), [(0, 10), (3, 10), (17, 20), (20, 20)])
+def test_wilson_is_scipys(k: int, n: int) -> None:
+    expected = binomtest(k, n).proportion_ci(method="wilson")
+    assert wilson(k, n) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+def test_wilson_edges() -> None:
+    assert wilson(0, 0) == (0.0, 1.0)
+    with pytest.raises(ArgumentError, match="successes"):
+        wilson(3, 2)
+
+
+def recording(rise: np.ndarray, turned: float, exploded: bool = False) -> Recording:
+    """Two seconds in which the wheels rise by ``rise`` (4,) from half time on, turning evenly by
+    ``turned``."""
+    times = np.linspace(0, 2, 201)
+    heights = 0.098 + np.where(times[:, None] > 1.0, rise, 0.0)
+    zero4, zero = np.zeros((201, 4)), np.zeros(201)
+    return Recording(
+        "none",
+        "0",
+        times,
+        np.zeros((201, 3)),
+        zero,
+        zero,
+        zero,
+        np.outer(times / 2, np.full(4, turned)),
+        zero4,
+        zero4,
+        heights,
+        np.zeros(201, dtype=np.int64),
+        exploded,
+        "why" if exploded else "",
+        1.0,
+        1.0,
+    )
+
+
+def test_a_wheel_is_up_at_seven_tenths_of_the_step() -> None:
+    outcome = judge(CLIMB, recording(np.array([0.036, 0.05, 0.034, 0.0]), 4.0))
+    assert outcome.up == (True, True, False, False)
+    assert not outcome.critical_up
+    both = judge(CLIMB, recording(np.array([0.036, 0.0, 0.036, 0.0]), 4.0))
+    assert both.critical_up
+    assert both.first_attempt
+    assert not both.all_up
+    late = judge(CLIMB, recording(np.array([0.036, 0.0, 0.036, 0.0]), 17.0))
+    assert late.critical_up
+    assert not late.first_attempt
+
+
+def test_exploded_runs_are_counted_and_left_out() -> None:
+    good, bad = (
+        Outcome((True,) * 4, True, True, False, "", 0.0),
+        judge(CLIMB, recording(np.ones(4), 1.0, True)),
+    )
+    found = rate([good, bad, good])
+    assert (found.successes, found.trials, found.exploded) == (2, 2, 1)
+    assert found.share == 1.0
+    with pytest.raises(ArgumentError, match="what"):
+        rate([good], what="luck")
+
+
+def test_planner_and_simulator_agree_on_the_wheel() -> None:
+    """The robot that physics climbs with has the problem's sizes and wheel places."""
+    problem = load_maneuver(FILE)
+    wheel, robot = problem.robot.wheel, STEP.robot()
+    assert robot.wheels[0].radius == wheel.radius
+    beyond = (robot.wheels[0].width - wheel.width) / 2  # rollers stand out of the hubs' faces
+    assert 0 <= beyond < problem.approach.gap / 3
+    places = [(w.l * math.cos(w.alpha), w.l * math.sin(w.alpha)) for w in problem.platform.wheels]
+    assert np.array(robot.wheel_positions) == pytest.approx(np.array(places), abs=1e-12)
+
+
+def test_planned_lateral_climb_gets_up_and_a_wall_does_not() -> None:
+    pytest.importorskip("mujoco")
+    problem = load_maneuver(FILE)
+    plan = plan_configuration(problem, configurations(problem.robot.wheel, problem.obstacle)[0])
+    assert isinstance(plan, Plan)
+    a, b, c, d = plan.target.wheels
+    i, j = (WHEELS.index(w) for w in plan.configuration.critical)
+    climb = Climb(
+        STEP,
+        plan.target.pose,
+        (a, b, c, d),
+        plan.configuration.direction,
+        (i, j),
+        plan.target.travel,
+    )
+    first = run_climb(climb)
+    assert first.critical_up
+    assert not first.exploded
+    assert climb_all([climb]) == [first]  # the same bits again
+    wall = run_climb(replace(climb, step=replace(STEP, height=0.09)))
+    assert not any(wall.up)
+    assert not run_climb(replace(climb, step=replace(STEP, torque=1.0))).critical_up

@@ -1,0 +1,383 @@
+"""The optimizer benchmark: every optimizer on every problem with every seed, as the cases of a
+sweep.
+
+The sweep makes it resumable (a row is stored whole or not at all), runs each case in a process of
+its own that may die or hang without harm to others, and records versions, commit and host.
+Optimizers never score themselves: a row's cost and violation are recomputed by the objective at the
+final candidate.
+"""
+
+from __future__ import annotations
+
+import datetime
+import json
+import platform
+import time
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.bench.problems import (
+    BenchProblem,
+    bench_problem,
+    best_known,
+    more_wild_names,
+    objective_named,
+)
+from trajopt.errors import ArgumentError
+from trajopt.optimize.base import FEASIBLE, Budget, Optimizer, OptimizeResult
+from trajopt.optimize.plugins import optimizers_of_file
+from trajopt.optimize.search import minimize, optimizer_named
+from trajopt.sweeps.cases import Case
+from trajopt.sweeps.drive import Progress
+from trajopt.sweeps.store import Store
+from trajopt.sweeps.sweeps import sweep
+
+Array = NDArray[np.float64]
+
+TARGETS = tuple(
+    10.0**-k for k in range(1, 10)
+)  # shares of reference - best still left; Moré and Wild's tau
+_KEYS = {
+    "title",
+    "problems",
+    "optimizers",
+    "seeds",
+    "evaluations",
+    "seconds",
+    "longer",
+    "time_limit",
+    "problem_root",
+    "plugins",
+}
+_SEEDS_IN_A_ROW = 5  # chosen
+_WARM = Budget(evaluations=60)  # a first search that loads and compiles, timed apart; chosen
+
+
+@dataclass(frozen=True)
+class BenchPlan:
+    """What a benchmark runs: ``seeds`` each for stochastic optimizers, one for others.
+
+    A search may use ``evaluations`` and ``seconds`` of processor time; ``longer`` gives other
+    seconds to problems whose names start with a text. ``time_limit`` (wall-clock s) is when a case
+    counts as hanging.
+    """
+
+    title: str
+    problems: tuple[str, ...]
+    optimizers: tuple[str, ...]
+    seeds: int = 15
+    evaluations: int = 25_000  # 50 particles x 500 iterations, thesis 000 Table 5.8
+    seconds: float = 10.0
+    longer: Mapping[str, float] = field(default_factory=dict)
+    time_limit: float = 60.0
+    problem_root: str = "problems"
+    plugins: tuple[str, ...] = ()
+
+    def cases(self) -> list[dict[str, Any]]:
+        """One case a problem, optimizer and seed; optimizers that cannot work on a problem are left
+        out."""
+        makers = {name: named_optimizer(name, self.plugins) for name in self.optimizers}
+        found = []
+        for problem in self.problems:
+            objective, _ = objective_named(problem, self.plugins, self.problem_root)
+            for name, method in makers.items():
+                if not suits(method, objective):
+                    continue
+                seeds = self.seeds if method.stochastic else 1
+                found += [
+                    {"problem": problem, "optimizer": name, "seed": seed} for seed in range(seeds)
+                ]
+        # Five seeds of everything first: what was built for a problem serves them all, and a run
+        # that is stopped early leaves rows of all problems.
+        return sorted(found, key=lambda case: case["seed"] // _SEEDS_IN_A_ROW)
+
+
+def suits(method: Optimizer, objective: Any) -> bool:
+    """Whether an optimizer can work on an objective."""
+    if method.needs - objective.provides:
+        return False
+    if method.name == "lattice" and not hasattr(objective, "affine_part"):
+        return False
+    only_bounds = (
+        "l-bfgs-b",
+        "nelder-mead",
+        "dual-annealing",
+        "direct",
+        "bobyqa",
+        "pyswarms",
+        "pymoo-pso",
+    )
+    return not (objective.constrained and method.name in only_bounds)
+
+
+def named_optimizer(name: str, plugins: Iterable[str] = ()) -> Optimizer:
+    """The optimizer called ``name``: of a plugin file, a peer package, or the package itself."""
+    from trajopt.bench.peers import PEERS
+
+    for file in plugins:
+        offered = optimizers_of_file(file) if _offers(file) else {}
+        if name in offered:
+            made: Optimizer = offered[name]()
+            return made
+    return PEERS[name]() if name in PEERS else optimizer_named(name)
+
+
+def _offers(file: str) -> bool:
+    from trajopt.optimize.plugins import plugin
+
+    return hasattr(plugin(file), "OPTIMIZERS")
+
+
+def load_bench(path: str | Path, plugins: Iterable[str | Path] = ()) -> BenchPlan:
+    """Plan from a TOML file. Raises ArgumentError naming the key that is wrong.
+
+    "more-wild/*" among the problems stands for the whole set.
+    """
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ArgumentError("bench file", str(path), f"a readable TOML file ({error})") from None
+    for key in data.keys() - _KEYS:
+        raise ArgumentError(
+            f"{path}: {key}", data[key], "one of the keys " + ", ".join(sorted(_KEYS))
+        )
+    for key in ("problems", "optimizers"):
+        if (
+            not isinstance(data.get(key), list)
+            or not data[key]
+            or not all(isinstance(v, str) for v in data[key])
+        ):
+            raise ArgumentError(f"{path}: {key}", data.get(key), "a list of names")
+    for key in ("seeds", "evaluations", "seconds", "time_limit"):
+        if key in data and (
+            isinstance(data[key], bool) or not isinstance(data[key], (int, float)) or data[key] <= 0
+        ):
+            raise ArgumentError(f"{path}: {key}", data[key], "a number > 0")
+    longer = data.get("longer", {})
+    if not isinstance(longer, dict) or not all(
+        isinstance(v, (int, float)) and v > 0 for v in longer.values()
+    ):
+        raise ArgumentError(
+            f"{path}: longer", longer, "seconds > 0 by the start of a problem's name"
+        )
+    files = [str(Path(p).resolve()) for p in (*data.pop("plugins", []), *plugins)]
+    asked = data.pop("problems")
+    problems = [
+        name for text in asked for name in (more_wild_names() if text == "more-wild/*" else [text])
+    ]
+    for file in files:
+        from trajopt.optimize.plugins import mapping_of_file
+
+        problems += [name for name in mapping_of_file(file, "PROBLEMS") if name not in problems]
+        data["optimizers"] += [
+            n for n in mapping_of_file(file, "OPTIMIZERS") if n not in data["optimizers"]
+        ]
+    title = str(data.pop("title", Path(path).stem))
+    return BenchPlan(
+        title,
+        tuple(dict.fromkeys(problems)),
+        tuple(dict.fromkeys(data.pop("optimizers"))),
+        plugins=tuple(files),
+        **data,
+    )
+
+
+@dataclass(frozen=True)
+class BenchRun:
+    """The sweep's run function: one search. ``seconds`` by the start of a problem's name; "" stands
+    for all."""
+
+    evaluations: int
+    seconds: tuple[tuple[str, float], ...]
+    problem_root: str
+    plugins: tuple[str, ...]
+
+    def __call__(self, case: Case) -> dict[str, Any]:
+        """One row. Loading, building and compiling are timed apart (``construct_seconds``)."""
+        name, wall = str(case["problem"]), time.perf_counter()
+        problem, method, construct = _built(
+            name, str(case["optimizer"]), self.plugins, self.problem_root
+        )
+        most = max(
+            (entry for entry in self.seconds if name.startswith(entry[0])),
+            key=lambda entry: len(entry[0]),
+        )[1]
+        found = _search(
+            problem, method, int(case["seed"]), Budget(self.evaluations, most, clock="cpu")
+        )
+        return {
+            "dimension": problem.objective.dimension,
+            "cost": found.fun,
+            "violation": found.violation,
+            "feasible": found.violation <= FEASIBLE,
+            "nfev": found.nfev,
+            "gradients": found.ngev,
+            "hessians": found.nhev,
+            "seconds": found.seconds,
+            "wall_seconds": time.perf_counter() - wall,
+            "construct_seconds": construct,
+            "stop": found.status.name.lower(),
+            "message": found.message,
+            "failures": found.failures,
+            "first_failure": found.first_failure,
+            "reference": problem.reference,
+            "best": problem.best,
+            "found_by": problem.found_by,
+            "cpu": _cpu(),
+            "x": json.dumps(found.x.tolist()),
+            **_history(problem, found),
+        }
+
+
+@lru_cache(maxsize=2)
+def _built(
+    name: str, optimizer: str, plugins: tuple[str, ...], root: str
+) -> tuple[BenchProblem, Optimizer, float]:
+    """Problem and optimizer, after a short search that loads and compiles what they need, and its
+    CPU seconds.
+
+    Kept for the seeds that follow in the same process.
+    """
+    started = time.process_time()
+    problem, method = bench_problem(name, plugins, root), named_optimizer(optimizer, plugins)
+    _search(problem, method, 0, _WARM)
+    return problem, method, time.process_time() - started
+
+
+def _search(problem: BenchProblem, method: Optimizer, seed: int, budget: Budget) -> OptimizeResult:
+    return minimize(problem.objective, problem.bounds, optimizer=method, seed=seed, budget=budget)
+
+
+def _history(problem: BenchProblem, found: OptimizeResult) -> dict[str, Any]:
+    """Improvements of the feasible best, as short lists: evaluations, seconds, cost (thinned to 10
+    a decade).
+
+    The final candidate, which a method may have polished without evaluating it, ends the list.
+    """
+    h = found.history
+    ok = h.violation <= FEASIBLE
+    evaluations, seconds, cost = h.evaluations[ok].astype(float), h.seconds[ok], h.cost[ok]
+    if (
+        found.violation <= FEASIBLE
+        and np.isfinite(found.fun)
+        and (not len(cost) or found.fun < cost[-1])
+    ):
+        evaluations, seconds = np.append(evaluations, found.nfev), np.append(seconds, found.seconds)
+        cost = np.append(cost, found.fun)
+    floor = problem.best if np.isfinite(problem.best) else (cost[-1] if len(cost) else 0.0)
+    decade = np.floor(10 * np.log10(np.maximum(cost - floor, 1e-16)))
+    keep = (
+        np.append(decade[:-1] != decade[1:], True) if len(cost) else np.zeros(0, bool)
+    )  # last of each step
+    keep[:1] = True
+    return {
+        "at_evaluations": evaluations[keep].tolist(),
+        "at_seconds": seconds[keep].tolist(),
+        "at_cost": cost[keep].tolist(),
+    }
+
+
+def _cpu() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    return next(
+        (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")),
+        platform.processor() or platform.machine(),
+    )
+
+
+def run_bench(
+    plan: BenchPlan,
+    store: str | Path,
+    *,
+    jobs: int = 1,
+    retry_failed: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+) -> Store:
+    """Run all cases that have no row in ``store`` yet (or only a failed one), ``jobs`` at a
+    time."""
+    seconds = (("", plan.seconds), *sorted(plan.longer.items()))
+    run = BenchRun(plan.evaluations, seconds, str(Path(plan.problem_root).resolve()), plan.plugins)
+    about = {
+        "evaluations": plan.evaluations,
+        "seconds": dict(seconds),
+        "plugins": list(plan.plugins),
+    }
+    return sweep(
+        plan.cases(),
+        run,
+        executor=jobs,
+        store=store,
+        time_limit=plan.time_limit,
+        problem=about,
+        retry_failed=retry_failed,
+        source=json.dumps(
+            {"title": plan.title, "problems": plan.problems, "optimizers": plan.optimizers}
+        ),
+        progress=progress,
+    )
+
+
+def best_costs(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, str]]:
+    """Best feasible cost of each problem: the known one, or what a row of this run found, and who
+    found it."""
+    best: dict[str, tuple[float, str]] = {}
+    for row in rows:
+        name = str(row["problem"])
+        if name not in best:
+            known = {
+                "cost": row.get("best"),
+                "found_by": row.get("found_by") or "best_known.json",
+                **best_known().get(name, {}),
+            }
+            told = known["cost"] is not None and np.isfinite(known["cost"])
+            best[name] = (float(known["cost"]), str(known["found_by"])) if told else (np.inf, "")
+        cost = row.get("cost")
+        if (
+            row["status"] == "done"
+            and row.get("feasible")
+            and cost is not None
+            and cost < best[name][0]
+        ):
+            best[name] = (float(cost), f"{row['optimizer']}, seed {row['seed']}")
+    return best
+
+
+def write_best_known(store: Store, file: str | Path) -> dict[str, dict[str, Any]]:
+    """Merge the best rows of a benchmark into ``file`` (best_known.json), where they are better;
+    what it then holds.
+
+    Each entry has the cost, who found it (optimizer, seed, commit, date) and the decision
+    variables.
+    """
+    place = Path(file)
+    known: dict[str, dict[str, Any]] = (
+        json.loads(place.read_text(encoding="utf-8")) if place.exists() else {}
+    )
+    last = store.runs()[-1]
+    day = datetime.datetime.fromtimestamp(float(last["started"]), datetime.UTC).date().isoformat()
+    where = f"commit {str(last.get('commit'))[:7]}, {day}"
+    for row in store.frame().to_dict("records"):
+        name, cost = str(row["problem"]), row.get("cost")
+        if row["status"] != "done" or not row["feasible"] or cost is None or not np.isfinite(cost):
+            continue
+        told = (
+            row["best"] if row.get("best") is not None and np.isfinite(row["best"]) else np.inf
+        )  # elsewhere
+        if cost < min(told, known.get(name, {}).get("cost", np.inf)):
+            known[name] = {
+                "cost": float(cost),
+                "found_by": f"{row['optimizer']}, seed {int(row['seed'])}, {where}",
+                "x": json.loads(row["x"]),
+            }
+    place.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n", encoding="utf-8")
+    return known

@@ -1,0 +1,110 @@
+"""Routes of PowerBot for the optimizer benchmark: random corridors with static obstacles, and
+thesis 004's paths."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path as FilePath
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError
+from trajopt.limits.acceleration import Acceleration
+from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
+from trajopt.objectives.route import Corridor, RouteObjective
+from trajopt.paths.spline import uniform_basis
+from trajopt.problem.given_path import load_path_problem
+from trajopt.robots.powerbot import (
+    FRICTION,
+    LARGEST_ACCELERATION,
+    LARGEST_SPEED,
+    REAR,
+    WIDTH,
+    powerbot,
+)
+
+Array = NDArray[np.float64]
+
+RADIUS = math.hypot(
+    REAR, WIDTH / 2
+)  # m: the disc about the drive axle that covers PowerBot's outline
+LENGTH = 12.0  # m, of a corridor, chosen
+WALLS = (-2.5, 2.5)  # m, chosen: three robots side by side
+KNOTS = 4  # free ones between start and goal, chosen
+SHIFT = (
+    1.2  # m along the corridor by which a free knot may leave its even spacing: half of it, chosen
+)
+OBSTACLES = 4  # chosen
+OBSTACLE_RADII = (0.3, 0.7)  # m, chosen
+OBSTACLE_SIDE = 0.9  # m off the middle at most, chosen: one side of each stays wide enough
+MOVED_CELLS = 120  # intervals in a search: these paths start slowly in their parameter. Chosen: 0.1 % of the time
+TILE = 0.5  # m by which a knot of thesis 004's paths may be moved, chosen
+
+
+def random_corridor(seed: int, kind: Literal["length", "duration"]) -> RouteObjective:
+    """Start, goal and obstacles drawn from ``seed``; the robot starts and ends at rest, heading as
+    the route does.
+
+    The obstacles stand one after the other, each leaving at least one side open by construction:
+    walls at +-2.5 m less an obstacle's reach of at most 0.9 + 0.7 m always leave 2.7 m on the other
+    side.
+    """
+    rng = np.random.default_rng(seed)
+    start, goal = rng.uniform(-1.0, 1.0, 2)
+    x = LENGTH * (np.arange(OBSTACLES) + rng.uniform(0.85, 1.15, OBSTACLES)) / (OBSTACLES + 1)
+    y, radii = (
+        rng.uniform(-OBSTACLE_SIDE, OBSTACLE_SIDE, OBSTACLES),
+        rng.uniform(*OBSTACLE_RADII, OBSTACLES),
+    )
+    places = np.linspace(0.0, LENGTH, KNOTS + 2)
+    values = np.column_stack([places, np.linspace(start, goal, KNOTS + 2)])
+    bounds = [
+        row
+        for place in places[1:-1]
+        for row in ((place - SHIFT, place + SHIFT), (WALLS[0] + RADIUS, WALLS[1] - RADIUS))
+    ]
+    discs = tuple((float(a), float(b), float(r)) for a, b, r in zip(x, y, radii, strict=True))
+    return RouteObjective(
+        kind,
+        uniform_basis(KNOTS + 2),
+        values,
+        tuple(range(1, KNOTS + 1)),
+        np.array(bounds),
+        powerbot(),
+        (
+            Slip(FRICTION),
+            Speed(LARGEST_SPEED),
+            Acceleration(LARGEST_ACCELERATION, LARGEST_ACCELERATION),
+        ),
+        Corridor(WALLS, discs),
+        RADIUS,
+    )
+
+
+def moved_knots(file: FilePath) -> RouteObjective:
+    """Least duration of a path of thesis 004 under its own limits, inner knots free within a tile
+    of 0.5 m.
+
+    The limits are the physical ones and leave out the safety speed, which alone would set the
+    duration.
+    """
+    problem = load_path_problem(file)
+    if problem.ramps:
+        raise ArgumentError("problem", str(file), "a path on level ground")
+    path = problem.flat_path
+    free = tuple(range(1, len(path.basis.knots) - 1))
+    bounds = np.array([(c - TILE, c + TILE) for knot in free for c in path.coordinates[knot]])
+    limits = tuple(m for m in problem.as_limits(variant="physical") if m.name != "safety_speed")
+    return RouteObjective(
+        "duration",
+        path.basis,
+        path.coordinates,
+        free,
+        bounds,
+        problem.platform,
+        limits,
+        cells=MOVED_CELLS,
+    )

@@ -1,0 +1,219 @@
+"""Rows of an optimizer benchmark as arrays and tables: running times to targets, shares, costs by
+family."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.bench.comparison import TARGETS, best_costs
+from trajopt.bench.profiles import RunningTime, expected_running_time, no_worse, time_to_targets
+from trajopt.errors import ArgumentError
+
+Array = NDArray[np.float64]
+Row = Mapping[str, Any]
+Unit = Literal["evaluations", "evaluations and gradients", "seconds"]
+
+SOLVED = 1e-6  # share of reference - best left at which a problem counts as solved; chosen
+NEAR = 1e-2  # the same for nearly solved; chosen
+GRADIENT_METHODS = ("ipopt", "slsqp", "l-bfgs-b", "trust-constr", "least-squares")
+FAMILIES = {  # name in the report -> what the names of its problems look like
+    "SMDW, ideal drives (affine)": r"smdw/[^/]+/[^/]+",
+    "SMDW, limits, points free": r"smdw/[^/]+/(p1|p2|p1\+p2)/limits",
+    "SMDW, limits, points and headings free": r"smdw/[^/]+/.*heading/limits",
+    "random SMDW goals, limits": r"random-smdw/.*",
+    "corridor, least length": r"corridor/\d+/length",
+    "corridor, least time under slip": r"corridor/\d+/duration",
+    "thesis 004 path, least time": r"powerbot/.*",
+    "ASOC design, constrained": r"asoc/.*",
+    "classical, 10-D": r"classical/.*",
+    "Moré-Wild least squares": r"more-wild/.*",
+}
+
+
+class Share(NamedTuple):
+    """How an optimizer did on a family: shares of searches ``solved`` and ``near`` (SOLVED, NEAR),
+    the median share ``left`` and the median ``seconds`` of a search."""
+
+    solved: float
+    near: float
+    left: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class BenchTables:
+    """Everything the report needs, from the ``rows`` of a store."""
+
+    rows: Sequence[Row]
+
+    def __post_init__(self) -> None:
+        if not self.done:
+            raise ArgumentError("store", f"{len(self.rows)} rows", "at least one finished search")
+
+    @cached_property
+    def done(self) -> list[Row]:
+        return [row for row in self.rows if row["status"] == "done"]
+
+    @cached_property
+    def failed(self) -> list[Row]:
+        """Searches that raised, hung or died, and those whose objective failed at least once."""
+        return [row for row in self.rows if row["status"] != "done" or row.get("failures")]
+
+    @cached_property
+    def problems(self) -> tuple[str, ...]:
+        return tuple(sorted({str(row["problem"]) for row in self.done}))
+
+    @cached_property
+    def optimizers(self) -> tuple[str, ...]:
+        return tuple(sorted({str(row["optimizer"]) for row in self.rows}))
+
+    @cached_property
+    def best(self) -> dict[str, tuple[float, str]]:
+        return best_costs(self.rows)
+
+    @cached_property
+    def dimension(self) -> Array:
+        """(p,)"""
+        found = {str(row["problem"]): float(row["dimension"]) for row in self.done}
+        return np.array([found[name] for name in self.problems])
+
+    def families(self) -> dict[str, list[int]]:
+        """Positions of the problems of each family; what fits none is listed under its first
+        word."""
+        found: dict[str, list[int]] = {name: [] for name in FAMILIES}
+        for i, problem in enumerate(self.problems):
+            for name, pattern in FAMILIES.items():
+                if re.fullmatch(pattern, problem):
+                    found[name].append(i)
+                    break
+            else:
+                found.setdefault(problem.split("/")[0], []).append(i)
+        return {name: places for name, places in found.items() if places}
+
+    def scale(self, problem: str, row: Row) -> float:
+        """Cost difference that shares count from: the median random point's cost less the best
+        known one."""
+        reference = row["reference"]
+        spread = (reference if reference is not None else 1.0) - self.best[problem][0]
+        return float(spread) if np.isfinite(spread) and spread > 0 else 1.0
+
+    def gap(self, row: Row) -> float:
+        """Share of ``scale`` that a search left; inf for infeasible results."""
+        problem = str(row["problem"])
+        if row["status"] != "done" or not row["feasible"] or row["cost"] is None:
+            return float("inf")
+        return max(0.0, float(row["cost"]) - self.best[problem][0]) / self.scale(problem, row)
+
+    def times(self, unit: Unit, targets: Sequence[float] = TARGETS) -> Array:
+        """(p, o, s, t): what each search had used at each target; inf: missed, NaN: no such search.
+
+        A search that failed counts as missed.
+        """
+        seeds = sorted({int(row["seed"]) for row in self.rows})
+        table = np.full(
+            (len(self.problems), len(self.optimizers), len(seeds), len(targets)), np.nan
+        )
+        for row in self.rows:
+            if str(row["problem"]) not in self.problems:
+                continue
+            place = (
+                self.problems.index(str(row["problem"])),
+                self.optimizers.index(str(row["optimizer"])),
+                seeds.index(int(row["seed"])),
+            )
+            table[place] = (
+                np.inf if row["status"] != "done" else self._row_times(row, unit, targets)
+            )
+        return table
+
+    def _row_times(self, row: Row, unit: Unit, targets: Sequence[float]) -> Array:
+        problem = str(row["problem"])
+        best, scale = self.best[problem][0], self.scale(problem, row)
+        used = np.asarray(
+            row["at_seconds" if unit == "seconds" else "at_evaluations"], dtype=np.float64
+        )
+        if unit == "evaluations and gradients" and row["nfev"]:
+            used = used * (1.0 + row["dimension"] * (row.get("gradients") or 0) / row["nfev"])
+        return time_to_targets(used, row["at_cost"], best + scale * np.asarray(targets))
+
+    def shares(self) -> dict[str, dict[str, Share]]:
+        """Family -> optimizer -> how it did."""
+        found: dict[str, dict[str, Share]] = {}
+        for family, places in self.families().items():
+            names = {self.problems[i] for i in places}
+            found[family] = {}
+            for optimizer in self.optimizers:
+                rows = [
+                    r for r in self.rows if r["problem"] in names and r["optimizer"] == optimizer
+                ]
+                if rows:
+                    gaps = np.sort([self.gap(r) for r in rows])
+                    seconds = [r["seconds"] for r in rows if r["status"] == "done"]
+                    found[family][optimizer] = Share(
+                        float(np.mean(gaps <= SOLVED)),
+                        float(np.mean(gaps <= NEAR)),
+                        float(gaps[(len(gaps) - 1) // 2]),
+                        float(np.median(seconds)) if seconds else float("nan"),
+                    )
+        return found
+
+    def construction(self) -> list[tuple[str, str, float]]:
+        """Family, optimizer, median seconds to load, build and compile before a first search
+        (processor time)."""
+        found = []
+        for family, places in self.families().items():
+            names = {self.problems[i] for i in places}
+            for optimizer in self.optimizers:
+                times = [
+                    r["construct_seconds"]
+                    for r in self.done
+                    if r["problem"] in names and r["optimizer"] == optimizer
+                ]
+                if times:
+                    found.append((family, optimizer, float(np.median(times))))
+        return found
+
+    def running_times(self, share: float = 1e-5) -> list[tuple[str, str, RunningTime]]:
+        """Expected running time in evaluations until ``share`` is left, of each problem and
+        optimizer."""
+        rng = np.random.default_rng(0)
+        found = []
+        for problem in self.problems:
+            for optimizer in self.optimizers:
+                rows = [
+                    r for r in self.done if r["problem"] == problem and r["optimizer"] == optimizer
+                ]
+                if rows:
+                    times = [float(self._row_times(r, "evaluations", [share])[0]) for r in rows]
+                    used = [float(r["nfev"]) for r in rows]
+                    found.append((problem, optimizer, expected_running_time(times, used, rng)))
+        return found
+
+    def compared(
+        self, first: str, second: str, start: str = "classical/"
+    ) -> list[tuple[str, float, float, float]]:
+        """Problem, median cost of each, p-value of "first is worse" (rank-sum test), on problems
+        named ``start``..."""
+        found = []
+        for problem in self.problems:
+            costs = [
+                [r["cost"] for r in self.done if r["problem"] == problem and r["optimizer"] == name]
+                for name in (first, second)
+            ]
+            if problem.startswith(start) and all(costs):
+                found.append(
+                    (
+                        problem,
+                        float(np.median(costs[0])),
+                        float(np.median(costs[1])),
+                        no_worse(*costs),
+                    )
+                )
+        return found

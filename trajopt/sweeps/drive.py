@@ -1,0 +1,395 @@
+"""Drives chunks through an executor: sizes them by measured time, and survives workers that die.
+
+A chunk whose worker died is tried again; after three more deaths it runs alone, and from then on
+halves that die are halved again, until the one case whose worker always dies is found and recorded.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import time
+from asyncio import CancelledError
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import TrajoptError
+from trajopt.sweeps.cases import CaseTable
+from trajopt.sweeps.executors import Engine
+from trajopt.sweeps.host import (
+    RETRIES,
+    CaseLimits,
+    ChunkJob,
+    ChunkReport,
+    run_chunk,
+    stop_mark,
+    warm_up,
+)
+from trajopt.sweeps.rows import CRASHED, Kind, Row, row_table
+from trajopt.sweeps.runfunction import Packed
+from trajopt.sweeps.store import Store
+
+SAMPLED = 3  # cases run first, to learn their time and columns
+SHORTEST_CHUNK, LONGEST_CHUNK = (
+    0.25,
+    5.0,
+)  # s of work. chosen: a part costs some 10 ms, a crash costs a chunk
+_SHARE = (
+    4  # a chunk is a quarter of what is left for its worker: large first, small at the end; chosen
+)
+MOST_CASES = 10_000  # cases of one chunk, whatever their time; chosen
+_AHEAD = 2  # chunks in flight a worker, so that none waits for the submitter; chosen
+_STOP_GRACE = 20.0  # s that workers get to store what they have after a stop; chosen
+_MOST_REBUILDS = 1_000  # of executors, before something else must be wrong; chosen
+
+Array = NDArray[np.int64]
+
+
+class WorkerStartError(TrajoptError):
+    """Worker processes cannot start."""
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What all chunks of a run share."""
+
+    store: Store
+    run_id: str
+    run: Packed
+    limits: CaseLimits
+    parameter_kinds: Mapping[str, Kind]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """State of a run: cases ``done`` by status in this run, ``total`` to do, ``seconds`` since the
+    start."""
+
+    counts: Mapping[str, int]
+    total: int
+    seconds: float
+
+    @property
+    def finished(self) -> int:
+        return sum(self.counts.values())
+
+    @property
+    def remaining_seconds(self) -> float | None:
+        """Estimate from the rate so far; None before the first case."""
+        return (
+            (self.total - self.finished) * self.seconds / self.finished if self.finished else None
+        )
+
+
+@dataclass
+class _Chunk:
+    places: Array
+    deaths: int = 0
+
+
+@dataclass
+class Drive:
+    """One run over the cases of ``table`` at ``places``. Mutable by nature; lives for one run."""
+
+    table: CaseTable
+    places: Array
+    setup: Setup
+    engine: Engine
+    report: Callable[[Progress], None]
+    kinds: dict[str, Kind] = field(default_factory=dict)
+    counts: Counter[str] = field(default_factory=Counter)
+    retried: deque[_Chunk] = field(default_factory=deque)
+    suspects: deque[_Chunk] = field(default_factory=deque)
+    seconds_a_case: float | None = None
+    next: int = 0
+    stopping: bool = False
+
+    def go(self) -> None:
+        """Run everything. Raises KeyboardInterrupt after a clean stop, StoreError, RunLoadError."""
+        self.started = time.monotonic()
+        self._sample_first()
+        mark = stop_mark(self.setup.store.path, self.setup.run_id)
+        flights: dict[Future[ChunkReport], _Chunk] = {}
+        rebuilds = 0
+        context, executor = self._started()
+        try:
+            while flights or self._waiting():
+                try:
+                    self._submit(executor, flights)
+                    done, _ = wait(flights, timeout=1.0, return_when=FIRST_COMPLETED)
+                    broken = self._collect({f: flights.pop(f) for f in done})
+                except BrokenExecutor:
+                    broken = True
+                if broken:
+                    rebuilds += 1
+                    self._blame(flights)
+                    context, executor = self._rebuilt(context, rebuilds)
+        except (
+            BaseException
+        ):  # Ctrl-C, a full disk: let the workers keep what they have, then pass it on
+            self._stop(flights, mark)
+            raise
+        finally:
+            with contextlib.suppress(
+                Exception
+            ):  # of a cluster that lost processes: all that counts is stored
+                context.__exit__(None, None, None)
+            mark.unlink(missing_ok=True)
+
+    # -- chunks
+    # ---------------------------------------------------------------------------------------
+
+    def _sample_first(self) -> None:
+        """Bring a first, a middle and a last case to the front."""
+        n = len(self.places)
+        if n > SAMPLED:
+            front = np.array([0, n // 2, n - 1])
+            self.places = np.concatenate([self.places[front], np.delete(self.places, front)])
+
+    def _waiting(self) -> bool:
+        return bool(self.retried or self.suspects or self.next < len(self.places))
+
+    def _size(self) -> int:
+        left = len(self.places) - self.next
+        if self.seconds_a_case is None:
+            return SAMPLED
+        time_left = left * self.seconds_a_case / self.engine.workers
+        target = min(max(time_left / _SHARE, SHORTEST_CHUNK), LONGEST_CHUNK)
+        return int(min(max(target / max(self.seconds_a_case, 1e-9), 1), MOST_CASES, left))
+
+    def _take(self) -> _Chunk | None:
+        if self.retried:
+            return self.retried.popleft()
+        if self.next >= len(self.places):
+            return None
+        size = self._size()
+        chunk = _Chunk(self.places[self.next : self.next + size])
+        self.next += size
+        return chunk
+
+    def _submit(self, executor: Executor, flights: dict[Future[ChunkReport], _Chunk]) -> None:
+        alone = any(c.deaths > RETRIES for c in flights.values())
+        while not alone and len(flights) < self.engine.workers * _AHEAD:
+            if self.seconds_a_case is None and flights:
+                return  # the sampled cases run first
+            chunk = self._take()
+            if chunk is None:
+                if flights or not self.suspects:
+                    return
+                chunk, alone = self.suspects.popleft(), True
+            try:
+                flights[executor.submit(run_chunk, self._job(chunk))] = chunk
+            except BaseException:
+                self.retried.appendleft(chunk)
+                raise
+
+    def _job(self, chunk: _Chunk) -> ChunkJob:
+        cases, setup = self.table.take(chunk.places), self.setup
+        return ChunkJob(
+            str(setup.store.path),
+            chunk_name(cases),
+            cases,
+            setup.run,
+            setup.limits,
+            dict(self.kinds),
+            setup.parameter_kinds,
+            str(stop_mark(setup.store.path, setup.run_id)),
+        )
+
+    # -- outcomes
+    # -------------------------------------------------------------------------------------
+
+    def _collect(self, done: dict[Future[ChunkReport], _Chunk]) -> bool:
+        """Take in finished chunks; True when the executor broke."""
+        broken = False
+        for future, chunk in done.items():
+            try:
+                outcome = future.result()
+            except BrokenExecutor:
+                broken = True
+                self._died(chunk)
+            except TrajoptError:
+                raise
+            except (
+                Exception
+            ) as error:  # Dask's KilledWorker and its like: the task's worker is gone
+                if not _is_death(error):
+                    raise
+                self._died(chunk)
+            else:
+                self._learn(outcome, chunk)
+        return broken
+
+    def _learn(self, outcome: ChunkReport, chunk: _Chunk) -> None:
+        self.counts.update(outcome.counts)
+        for name, kind in outcome.kinds.items():
+            self.kinds.setdefault(name, kind)
+        finished = sum(outcome.counts.values())
+        if (
+            outcome.unfinished and not self.stopping
+        ):  # stopped from outside: what is left runs again
+            self.next_missing(chunk)
+        if finished:
+            first = self.seconds_a_case is None
+            seconds = outcome.median_seconds if first else outcome.seconds / finished
+            self.seconds_a_case = (
+                seconds
+                if first or self.seconds_a_case is None
+                else (0.5 * (self.seconds_a_case + seconds))
+            )
+        self.report(Progress(dict(self.counts), len(self.places), time.monotonic() - self.started))
+
+    def next_missing(self, chunk: _Chunk) -> None:
+        """Queue those cases of a chunk that have no row yet."""
+        known = self.setup.store.finished()
+        left = chunk.places[~np.isin(self.table.ids[chunk.places], known)]
+        if len(left):
+            self.retried.append(_Chunk(left))
+
+    def _died(self, chunk: _Chunk) -> None:
+        """The worker of a chunk died: try again, then alone, then in halves, then record the one
+        case."""
+        chunk.deaths += 1
+        if chunk.deaths <= RETRIES:
+            self.retried.append(chunk)
+        elif chunk.deaths == RETRIES + 1:
+            self.suspects.append(chunk)
+        elif len(chunk.places) > 1:
+            middle = len(chunk.places) // 2
+            # Already suspected: each half runs alone once, and is halved again if its worker dies.
+            self.suspects.extend(
+                _Chunk(half, RETRIES + 1) for half in (chunk.places[:middle], chunk.places[middle:])
+            )
+        elif chunk.deaths <= 2 * RETRIES + 1:
+            self.suspects.append(chunk)
+        else:
+            self._record_guilty(chunk)
+
+    def _record_guilty(self, chunk: _Chunk) -> None:
+        cases = self.table.take(chunk.places)
+        row = Row(
+            0,
+            CRASHED,
+            {},
+            {},
+            "WorkerDied",
+            f"its worker died {chunk.deaths} times while running this case",
+            "",
+            time.time(),
+            0.0,
+            chunk.deaths,
+        )
+        self.setup.store.write_part(
+            "parts",
+            chunk_name(cases),
+            row_table([row], cases, self.setup.parameter_kinds, self.kinds, "submitter"),
+        )
+        self.counts[CRASHED] += 1
+        if self.seconds_a_case is None:
+            self.seconds_a_case = SHORTEST_CHUNK
+
+    def _blame(self, flights: dict[Future[ChunkReport], _Chunk]) -> None:
+        """After a break: results that are there count, all other chunks in flight are under
+        suspicion."""
+        wait(flights, timeout=5.0)
+        self._collect({f: c for f, c in flights.items() if f.done()})
+        for future, chunk in flights.items():
+            if not future.done():
+                self._died(chunk)
+        flights.clear()
+
+    def _started(self) -> tuple[AbstractContextManager[Executor], Executor]:
+        """A working executor. One whose workers cannot even start is no case's fault: raises
+        WorkerStartError."""
+        fault: BaseException | None = None
+        for _ in range(self.engine.starts):
+            context = self.engine.start()
+            try:
+                executor = context.__enter__()
+            except TrajoptError:
+                raise
+            except (
+                Exception,
+                CancelledError,
+            ) as error:  # a cluster some of whose processes died while it started
+                fault = error
+                continue
+            try:
+                starts = [
+                    executor.submit(warm_up, self.setup.run, self.setup.limits.memory)
+                    for _ in range(self.engine.workers)
+                ]
+                done, _ = wait(starts, return_when=FIRST_COMPLETED)
+                for start in done:
+                    start.result()
+                return context, executor
+            except BaseException as error:
+                with contextlib.suppress(Exception):
+                    context.__exit__(None, None, None)
+                if not isinstance(error, BrokenExecutor) and not _is_death(error):
+                    raise
+        raise WorkerStartError(
+            f"{self.engine.name}: workers died at {self.engine.starts} starts in a row, before any "
+            "case; finished cases are kept; a script that runs a sweep needs "
+            '`if __name__ == "__main__":` around what it does'
+        ) from fault
+
+    def _rebuilt(
+        self, context: AbstractContextManager[Executor], rebuilds: int
+    ) -> tuple[AbstractContextManager[Executor], Executor]:
+        with contextlib.suppress(Exception):
+            context.__exit__(None, None, None)
+        if not self.engine.rebuilds or rebuilds > _MOST_REBUILDS:
+            raise BrokenExecutor(
+                f"the executor ({self.engine.name}) broke and cannot be made anew; finished cases "
+                "are kept: run the sweep again, or give a factory instead of an executor"
+            )
+        if self.seconds_a_case is None and rebuilds > RETRIES:
+            self.seconds_a_case = (
+                SHORTEST_CHUNK  # the sampled cases kill their worker: go on with small chunks
+            )
+        return self._started()
+
+    def _stop(self, flights: dict[Future[ChunkReport], Any], mark: Path) -> None:
+        self.stopping = True
+        with contextlib.suppress(OSError):
+            mark.touch()
+        for future in flights:
+            future.cancel()
+        with contextlib.suppress(KeyboardInterrupt):
+            done, _ = wait([f for f in flights if not f.cancelled()], timeout=_STOP_GRACE)
+            for future in done:
+                with contextlib.suppress(Exception):
+                    self._learn(future.result(timeout=0), flights[future])
+
+
+def chunk_name(cases: CaseTable) -> str:
+    """Name of a chunk: a hash of its cases' identities."""
+    return hashlib.blake2b(cases.ids.tobytes(), digest_size=8).hexdigest()
+
+
+def sampled(table: CaseTable, count: int = SAMPLED) -> CaseTable:
+    """First, middle and last cases of a table, for estimates."""
+    places = np.unique(
+        np.linspace(0, len(table) - 1, min(count, len(table))).round().astype(np.int64)
+    )
+    return table.take(places)
+
+
+def _is_death(error: BaseException) -> bool:
+    """Whether an error of a future says that the worker is gone (Dask; its classes are not imported
+    here)."""
+    return type(error).__name__ in (
+        "KilledWorker",
+        "CancelledError",
+        "FutureCancelledError",
+        "CommClosedError",
+    )

@@ -1,0 +1,252 @@
+"""Where chunks run: existing executors only, each behind ``Engine``.
+
+One machine: ``concurrent.futures.ProcessPoolExecutor`` with spawned processes. Many: Dask
+distributed, through ``Client.get_executor`` (a local cluster, a scheduler's address, or Slurm by
+dask-jobqueue). Anything else that is a ``concurrent.futures.Executor`` works too. Servers listen on
+loopback unless another address is given.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Any
+
+from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.sweeps.child import THREAD_VARIABLES
+
+LOOPBACK = "127.0.0.1"
+# Starts in a row that may fail before an engine counts as broken. A Dask cluster takes seconds to
+# start, and the death of any of its processes meanwhile, from outside, spoils the whole start;
+# chosen: never seen in 300 random kills.
+_POOL_STARTS, _DASK_STARTS = 6, 12
+_GRACE = 5.0  # s an orphaned worker gets to store what it has; chosen
+
+
+@dataclass(frozen=True)
+class Engine:
+    """``start`` gives an executor for as long as its context lasts; ``workers`` is how many cases
+    run at once.
+
+    ``rebuilds``: whether ``start`` may be called again after the executor broke. ``starts``: how
+    many in a row may fail before the engine counts as broken.
+    """
+
+    name: str
+    start: Callable[[], AbstractContextManager[Executor]]
+    workers: int
+    rebuilds: bool = True
+    starts: int = _POOL_STARTS
+
+
+def engine_of(executor: Engine | Executor | Callable[[], Executor] | int | None) -> Engine:
+    """Engine for what a caller gave: None (all processors), a number of processes, an executor or a
+    factory."""
+    if isinstance(executor, Engine):
+        return executor
+    if executor is None:
+        return processes(available_processors())
+    if isinstance(executor, int) and not isinstance(executor, bool):
+        return processes(executor)
+    if isinstance(executor, Executor):
+        given = executor
+        return Engine(
+            type(given).__name__,
+            lambda: contextlib.nullcontext(given),
+            _width(given),
+            rebuilds=False,
+        )
+    if callable(executor):
+        factory = executor
+        return Engine(
+            getattr(factory, "__name__", "executor"),
+            lambda: _closing(factory()),
+            available_processors(),
+        )
+    raise ArgumentError(
+        "executor", executor, "None, a number of processes, an Executor, a factory or an Engine"
+    )
+
+
+def processes(workers: int) -> Engine:
+    """Engine of ``workers`` spawned processes on this machine."""
+    if workers < 1:
+        raise ArgumentError("workers", workers, "a whole number >= 1")
+
+    def start() -> AbstractContextManager[Executor]:
+        return _closing(
+            ProcessPoolExecutor(
+                workers,
+                mp_context=get_context("spawn"),
+                initializer=prepare_worker,
+                initargs=(os.getpid(),),
+            )
+        )
+
+    return Engine(f"{workers} processes", start, workers)
+
+
+def dask_local(workers: int, *, host: str = LOOPBACK, dashboard: str | None = None) -> Engine:
+    """Engine of a Dask cluster on this machine; ``dashboard`` is an address such as
+    "127.0.0.1:8787" (none: off)."""
+    distributed = _distributed()
+
+    @contextmanager
+    def start() -> Iterator[Executor]:
+        # Memory is limited case by case; a worker that Dask ends for its memory would cost a whole
+        # chunk.
+        with (
+            _tries_once(),
+            distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host=host,
+                memory_limit=0,
+                silence_logs=40,
+                dashboard_address=dashboard,
+                worker_dashboard_address=dashboard and f"{host}:0",
+                # Without a dashboard the scheduler still answers HTTP: on any free port, not on a
+                # fixed one.
+                scheduler_kwargs={} if dashboard else {"dashboard_address": f"{host}:0"},
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            # Dask drops a worker that is down, even if only for a restart, some seconds after any
+            # death of it.
+            cluster.adapt(minimum=workers, maximum=workers, interval="1s")
+            yield client.get_executor(pure=False)
+
+    return Engine(f"Dask, {workers} local workers", start, workers, starts=_DASK_STARTS)
+
+
+def dask_at(address: str) -> Engine:
+    """Engine of a running Dask scheduler, such as "tcp://127.0.0.1:8786"."""
+    distributed = _distributed()
+    with distributed.Client(address, timeout="10s") as client:
+        workers = max(1, sum(client.nthreads().values()))
+
+    @contextmanager
+    def start() -> Iterator[Executor]:
+        with distributed.Client(address, timeout="10s") as client:
+            yield client.get_executor(pure=False)
+
+    return Engine(f"Dask at {address}", start, workers, starts=_DASK_STARTS)
+
+
+def dask_slurm(
+    jobs: int,
+    *,
+    memory: str = "2GB",
+    walltime: str = "01:00:00",
+    host: str = LOOPBACK,
+    queue: str | None = None,
+    directory: str | None = None,
+) -> Engine:
+    """Engine of Dask workers that Slurm starts, one a job, through dask-jobqueue.
+
+    ``host`` is the address at which scheduler and workers listen; a cluster of several nodes needs
+    one that the others reach. Jobs that end early are replaced.
+    """
+    try:
+        from dask_jobqueue.slurm import SLURMCluster
+    except ImportError:
+        raise MissingDependencyError("dask-jobqueue", "sweep", "Dask on Slurm") from None
+    distributed = _distributed()
+    prologue = [f"export {name}=1" for name in THREAD_VARIABLES]
+
+    @contextmanager
+    def start() -> Iterator[Executor]:
+        with (
+            _tries_once(),
+            SLURMCluster(
+                cores=1,
+                processes=1,
+                memory=memory,
+                walltime=walltime,
+                queue=queue,
+                log_directory=directory,
+                local_directory=directory,
+                job_script_prologue=prologue,
+                scheduler_options={
+                    "host": host,
+                    "dashboard": False,
+                    "dashboard_address": f"{host}:0",
+                },
+                worker_extra_args=["--host", host, "--no-dashboard"],
+            ) as cluster,
+        ):
+            cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs, interval="2s")
+            with distributed.Client(cluster) as client:
+                yield client.get_executor(pure=False)
+
+    return Engine(f"Dask, {jobs} Slurm jobs", start, jobs, starts=_DASK_STARTS)
+
+
+def available_processors() -> int:
+    """Processors this process may use: fewer than the machine has under Slurm or taskset."""
+    return (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    )
+
+
+def prepare_worker(parent: int) -> None:
+    """Make a spawned process a quiet worker: it leaves Ctrl-C to its parent and does not outlive
+    it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for name in THREAD_VARIABLES:
+        os.environ[name] = "1"
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    time.sleep(_GRACE)  # the chunk in work sees it too, stops, and stores what is finished
+    os._exit(1)
+
+
+@contextmanager
+def _closing(executor: Executor) -> Iterator[Executor]:
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _width(executor: Executor) -> int:
+    """How many tasks an executor runs at once, where it says so; the processors of this machine
+    otherwise."""
+    for name in ("_max_workers", "max_workers"):
+        found = getattr(executor, name, None)
+        if isinstance(found, int) and found > 0:
+            return found
+    client: Any = getattr(executor, "_client", None)  # Dask's
+    return available_processors() if client is None else max(1, sum(client.nthreads().values()))
+
+
+def _tries_once() -> AbstractContextManager[Any]:
+    """Setting for schedulers made inside: a dead worker's task comes back at once, since ``Drive``
+    tries again."""
+    import dask
+
+    settings: AbstractContextManager[Any] = dask.config.set(
+        {"distributed.scheduler.allowed-failures": 0}
+    )
+    return settings
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise MissingDependencyError("distributed", "sweep", "sweeps on Dask") from None
+    return distributed

@@ -1,0 +1,249 @@
+"""One finished case as a row, and rows as Arrow tables with columns of known kinds."""
+
+from __future__ import annotations
+
+import enum
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.sweeps.cases import CaseTable
+
+Kind = Literal["number", "integer", "flag", "text", "numbers", "json"]
+
+DONE, ERROR, TIMEOUT, CRASHED = "done", "error", "timeout", "crashed"
+RUN_COLUMNS = ("run_started", "run_seconds", "run_host", "run_attempts", "error_traceback")
+FIXED_COLUMNS = ("case", "status", "case_seed", "error", "error_message", *RUN_COLUMNS)
+_LONGEST = (
+    1_000  # numbers in a list that may stay a table cell; longer ones belong into an array. chosen
+)
+
+
+class Row(NamedTuple):
+    """One finished case: ``place`` in its chunk, ``status``, flat ``results``, ``arrays`` kept
+    beside the table."""
+
+    place: int
+    status: str
+    results: dict[str, Any]
+    arrays: dict[str, NDArray[Any]]
+    error: str = ""
+    message: str = ""
+    traceback: str = ""
+    started: float = 0.0  # s since 1970
+    seconds: float = 0.0
+    attempts: int = 1
+
+
+def results_of(returned: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Table cells and arrays in what a run function returned: a mapping, a number, or None.
+
+    Nested mappings become dotted names, enums their names, NumPy arrays of one dimension or more go
+    beside the table. Raises ArgumentError, naming the key, for what no table can hold.
+    """
+    if returned is None:
+        return {}, {}
+    if not isinstance(returned, Mapping):
+        returned = {"value": returned}
+    cells: dict[str, Any] = {}
+    arrays: dict[str, NDArray[Any]] = {}
+    _flatten("", returned, cells, arrays)
+    return cells, arrays
+
+
+def _flatten(
+    prefix: str, values: Mapping[Any, Any], cells: dict[str, Any], arrays: dict[str, NDArray[Any]]
+) -> None:
+    for key, value in values.items():
+        if not isinstance(key, str):
+            raise ArgumentError("result key", key, "a text")
+        name = prefix + key
+        kind = type(value)
+        if kind is float or kind is str or kind is bool:
+            cells[name] = value
+        elif isinstance(value, enum.Enum):
+            cells[name] = value.name
+        elif isinstance(value, Mapping):
+            _flatten(name + ".", value, cells, arrays)
+        elif isinstance(value, np.ndarray) and value.ndim > 0 and value.dtype.kind in "biuf":
+            arrays[name] = value
+        else:
+            cells[name] = _cell(name, value)
+
+
+def _cell(name: str, value: Any) -> Any:
+    if isinstance(value, (np.generic, np.ndarray)) and value.ndim == 0:
+        value = value.item()
+    if value is None or isinstance(value, (bool, str)):
+        return value
+    if isinstance(value, (int, float)):
+        return float(value)  # one kind for all numbers, so that parts of a sweep never disagree
+    if (
+        isinstance(value, (list, tuple))
+        and len(value) <= _LONGEST
+        and all(isinstance(v, (int, float, np.number)) and not isinstance(v, bool) for v in value)
+    ):
+        return [float(v) for v in value]
+    raise ArgumentError(
+        f"result '{name}'",
+        type(value),
+        "a number, text, boolean, None, short list of numbers, NumPy "
+        "array of numbers, or a mapping of those",
+    )
+
+
+def kind_of(value: Any) -> Kind | None:
+    """Kind of column that holds a cell; None for a missing value."""
+    match value:
+        case None:
+            return None
+        case bool():
+            return "flag"
+        case str():
+            return "text"
+        case list():
+            return "numbers"
+        case _:
+            return "number"
+
+
+def result_kinds(rows: Sequence[Row], known: Mapping[str, Kind]) -> dict[str, Kind]:
+    """Kinds of all result columns: the known ones first, then what these rows bring, by their first
+    value."""
+    kinds = dict(known)
+    for row in rows:
+        for name, value in row.results.items():
+            if name not in kinds and (kind := kind_of(value)) is not None:
+                kinds[name] = kind
+    return kinds
+
+
+def fitted(rows: Sequence[Row], kinds: Mapping[str, Kind]) -> list[Row]:
+    """Rows whose cells fit the kinds; a cell of another kind turns its row into an error that says
+    so."""
+    result = []
+    for row in rows:
+        for name, value in row.results.items():
+            kind = kind_of(value)
+            if kind is not None and kind != kinds[name]:
+                row = row._replace(
+                    status=ERROR,
+                    results={},
+                    arrays={},
+                    error="ResultKindError",
+                    message=f"result '{name}' is {value!r} here, but a {kinds[name]} in other cases",
+                )
+                break
+        result.append(row)
+    return result
+
+
+def parameter_kind(column: NDArray[Any]) -> Kind:
+    """Kind of the table column that holds a column of case values."""
+    match column.dtype.kind:
+        case "b":
+            return "flag"
+        case "i":
+            return "integer"
+        case "f":
+            return "number"
+    types = {type(v) for v in column.tolist()} - {type(None)}
+    if types == {str}:
+        return "text"
+    if types == {list} and all(
+        type(x) in (int, float) for v in column.tolist() if v is not None for x in v
+    ):
+        return "numbers"
+    return "json"
+
+
+def arrow() -> Any:
+    """The pyarrow module. Raises MissingDependencyError."""
+    try:
+        import pyarrow
+        import pyarrow.compute
+    except ImportError:
+        raise MissingDependencyError("pyarrow", "sweep", "storing sweeps") from None
+    return pyarrow
+
+
+def arrow_type(kind: Kind) -> Any:
+    pa = arrow()
+    return {
+        "number": pa.float64(),
+        "integer": pa.int64(),
+        "flag": pa.bool_(),
+        "text": pa.string(),
+        "numbers": pa.list_(pa.float64()),
+        "json": pa.string(),
+    }[kind]
+
+
+def row_table(
+    rows: Sequence[Row],
+    cases: CaseTable,
+    parameter_kinds: Mapping[str, Kind],
+    kinds: Mapping[str, Kind],
+    host: str,
+) -> Any:
+    """Arrow table of rows: fixed columns, case values, results; ``row.place`` points into
+    ``cases``."""
+    pa = arrow()
+    places = np.array([r.place for r in rows], dtype=np.int64)
+    picked = cases.take(places)
+    ids = [i.decode() for i in picked.ids.tolist()]
+    failed = [r.status != DONE for r in rows]
+    data: dict[str, Any] = {
+        "case": pa.array(ids, pa.string()),
+        "status": pa.array([r.status for r in rows], pa.string()),
+        "case_seed": pa.array([int(i[:16], 16) >> 1 for i in ids], pa.int64()),
+    }
+    for name, column in picked.columns.items():
+        kind = parameter_kinds[name]
+        values = column.tolist()
+        if kind == "json":
+            values = [None if v is None else json.dumps(v, sort_keys=True) for v in values]
+        data[name] = pa.array(values, arrow_type(kind))
+    for name in sorted(kinds):
+        column_name = name if name not in data and name not in FIXED_COLUMNS else f"result.{name}"
+        data[column_name] = pa.array([r.results.get(name) for r in rows], arrow_type(kinds[name]))
+    for column_name, texts in (
+        ("error", [r.error for r in rows]),
+        ("error_message", [r.message for r in rows]),
+        ("error_traceback", [r.traceback for r in rows]),
+    ):
+        data[column_name] = pa.array(
+            [t if f else None for t, f in zip(texts, failed, strict=True)], pa.string()
+        )
+    data["run_started"] = pa.array(
+        [round(r.started * 1e6) for r in rows], pa.timestamp("us", tz="UTC")
+    )
+    data["run_seconds"] = pa.array([r.seconds for r in rows], pa.float64())
+    data["run_host"] = pa.array([host] * len(rows), pa.string())
+    data["run_attempts"] = pa.array([r.attempts for r in rows], pa.int32())
+    return pa.table(data)
+
+
+def array_table(rows: Sequence[Row], cases: CaseTable) -> Any:
+    """Arrow table of the arrays beside the rows: case, name, shape, values (row-major, float64);
+    None if none."""
+    pa = arrow()
+    found = [
+        (cases.ids[r.place].decode(), name, array) for r in rows for name, array in r.arrays.items()
+    ]
+    if not found:
+        return None
+    return pa.table(
+        {
+            "case": pa.array([f[0] for f in found], pa.string()),
+            "name": pa.array([f[1] for f in found], pa.string()),
+            "shape": pa.array([list(f[2].shape) for f in found], pa.list_(pa.int32())),
+            "values": pa.array(
+                [np.asarray(f[2], dtype=np.float64).ravel() for f in found], pa.list_(pa.float64())
+            ),
+        }
+    )

@@ -1,0 +1,245 @@
+"""Sweeps as plain Slurm job arrays: one array element a group of chunks, and no submitter that must
+stay alive.
+
+``submit`` writes what each element is to do into the store and calls ``sbatch``; ``element`` is
+what runs on the node. An element that is preempted or asked to end stores what it has finished;
+when Slurm runs it again it does only what is missing.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import FrameType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError, TrajoptError
+from trajopt.sweeps.cases import CaseTable
+from trajopt.sweeps.child import THREAD_VARIABLES
+from trajopt.sweeps.drive import MOST_CASES, SAMPLED, chunk_name, sampled
+from trajopt.sweeps.host import CaseLimits, ChunkJob, end_child, parameter_kinds, run_chunk
+from trajopt.sweeps.rows import arrow
+from trajopt.sweeps.runfunction import RunFunction, name_of, packed
+from trajopt.sweeps.store import Store
+from trajopt.sweeps.sweeps import close_record, known_kinds, missing, record_run, sweep
+
+CHUNK_SECONDS = 5.0  # work between two parts of an element: what a killed element loses; chosen
+ELEMENT_SECONDS = 300.0  # work of an element, against the 0.5 s that Slurm takes for one; chosen
+MOST_ELEMENTS = 1000  # Slurm's default MaxArraySize is 1001
+
+
+class SlurmError(TrajoptError):
+    """Slurm is not there, or refused a job."""
+
+
+@dataclass(frozen=True)
+class SlurmOptions:
+    """What ``sbatch`` is asked for. ``at_once``: elements running together (0: no limit);
+    ``elements``: how many (0: by measured time). ``extra``: further arguments of sbatch, as
+    given."""
+
+    time: str = "01:00:00"
+    memory: str = "2G"
+    partition: str | None = None
+    at_once: int = 0
+    elements: int = 0
+    extra: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.elements <= MOST_ELEMENTS:
+            raise ArgumentError("elements", self.elements, f"0 .. {MOST_ELEMENTS}")
+
+
+@dataclass(frozen=True)
+class Submission:
+    """An array that was handed to Slurm: its job number ("" when nothing was missing), elements,
+    and cases."""
+
+    job: str
+    elements: int
+    cases: int
+    folder: Path
+
+
+def submit(
+    table: CaseTable,
+    run: RunFunction,
+    store: Store,
+    *,
+    limits: CaseLimits,
+    options: SlurmOptions,
+    source: str = "",
+    retry_failed: bool = False,
+    wait: bool = False,
+    case_seconds: float | None = None,
+) -> Submission:
+    """Hand all missing cases to Slurm; ``wait`` until the array has ended.
+
+    Three sampled cases run here first, to learn the time and the columns of a case, unless
+    ``case_seconds`` says the time. Raises SlurmError.
+    """
+    if shutil.which("sbatch") is None:
+        raise SlurmError(
+            "sbatch is not installed here: submit from a Slurm login node, or use sweep run"
+        )
+    if case_seconds is None:
+        case_seconds = _sampled_seconds(table, run, store, limits, retry_failed)
+    places = missing(table, store, retry_failed=retry_failed)
+    folder = (
+        store.path
+        / "jobs"
+        / (time.strftime("%Y%m%dT%H%M%S", time.gmtime()) + "-" + uuid.uuid4().hex[:8])
+    )
+    if not len(places):
+        return Submission("", 0, 0, folder)
+    jobs = _chunks(table, places, run, store, limits, case_seconds)
+    count = options.elements or round(len(places) * case_seconds / ELEMENT_SECONDS)
+    count = min(max(count, 1), len(jobs), MOST_ELEMENTS)
+    for number in range(count):
+        store.write_text(f"jobs/{folder.name}/element-{number}.log", "")
+        _write_jobs(store, folder / f"element-{number}.pickle", jobs[number::count])
+    script = _script(folder, count, options)
+    store.write_text(f"jobs/{folder.name}/array.sh", script)
+    run_id = record_run(
+        store, table, len(places), name_of(run), f"Slurm array of {count}", source, limits
+    )
+    job = _sbatch(folder / "array.sh", wait)
+    if wait:
+        store.align()
+    close_record(store, run_id, f"submitted as job {job}", {})
+    return Submission(job, count, len(places), folder)
+
+
+def element(folder: str, number: int) -> int:
+    """Run one array element: exit code 0 when all its cases have rows, 75 (try again) when it was
+    told to stop."""
+    jobs: list[ChunkJob] = pickle.loads((Path(folder) / f"element-{number}.pickle").read_bytes())
+    told: list[int] = []
+
+    def tell(signum: int, _: FrameType | None) -> None:
+        told.append(signum)
+
+    signal.signal(signal.SIGTERM, tell)
+    signal.signal(signal.SIGINT, tell)
+    try:
+        for job in jobs:
+            left = _left(job)
+            if left is not None and not told:
+                report = run_chunk(left, lambda: bool(told))
+                print(f"{job.name}: {dict(report.counts)}, {report.unfinished} left", flush=True)
+            if told:
+                return os.EX_TEMPFAIL
+    finally:
+        end_child()
+    return 0
+
+
+def _left(job: ChunkJob) -> ChunkJob | None:
+    """The job without the cases that an earlier life of this element has stored; None when none is
+    left."""
+    import pyarrow.parquet as pq
+
+    parts = Path(job.store) / "parts"
+    found = [
+        pq.read_table(f, columns=["case"], use_threads=False)["case"].to_pylist()
+        for f in [*parts.glob(f"{job.name}-*.parquet"), *parts.glob("compact-*.parquet")]
+    ]
+    known = {key.encode() for keys in found for key in keys}
+    places = np.flatnonzero([i not in known for i in job.cases.ids.tolist()])
+    return replace(job, cases=job.cases.take(places)) if len(places) else None
+
+
+def _sampled_seconds(
+    table: CaseTable, run: RunFunction, store: Store, limits: CaseLimits, retry_failed: bool
+) -> float:
+    trial = sampled(table, SAMPLED)
+    sweep(
+        trial,
+        run,
+        executor=1,
+        store=store,
+        time_limit=limits.seconds,
+        memory_limit=limits.memory,
+        retry_failed=retry_failed,
+    )
+    rows = store.table(["run_seconds"])
+    keys = arrow().array([i.decode() for i in trial.ids.tolist()])
+    seconds = rows.filter(arrow().compute.is_in(rows["case"], keys))["run_seconds"].to_pylist()
+    return float(max(np.median(seconds), 1e-5))
+
+
+def _chunks(
+    table: CaseTable,
+    places: NDArray[np.int64],
+    run: RunFunction,
+    store: Store,
+    limits: CaseLimits,
+    case_seconds: float,
+) -> list[ChunkJob]:
+    size = int(min(max(CHUNK_SECONDS / case_seconds, 1), MOST_CASES))
+    kinds, columns, bundle = known_kinds(store, table), parameter_kinds(table), packed(run)
+    jobs = []
+    for start in range(0, len(places), size):
+        cases = table.take(places[start : start + size])
+        jobs.append(
+            ChunkJob(
+                str(store.path.resolve()), chunk_name(cases), cases, bundle, limits, kinds, columns
+            )
+        )
+    return jobs
+
+
+def _write_jobs(store: Store, file: Path, jobs: Sequence[ChunkJob]) -> None:
+    temporary = store.path / "temporary" / f"jobs-{uuid.uuid4().hex}"
+    with open(temporary, "wb") as handle:
+        pickle.dump(list(jobs), handle)
+        handle.flush()
+        os.fsync(handle.fileno())
+    os.replace(temporary, file)
+
+
+def _script(folder: Path, count: int, options: SlurmOptions) -> str:
+    place = folder.resolve()
+    program = (
+        f"import sys; sys.path[:] = {list(sys.path)!r}; from trajopt.sweeps.slurm import element; "
+        f"sys.exit(element({str(place)!r}, int(sys.argv[1])))"
+    )
+    limit = f"%{options.at_once}" if options.at_once else ""
+    lines = [
+        "#!/bin/bash",
+        "#SBATCH --job-name=trajopt-sweep",
+        f"#SBATCH --array=0-{count - 1}{limit}",
+        "#SBATCH --ntasks=1",
+        "#SBATCH --cpus-per-task=1",
+        f"#SBATCH --mem={options.memory}",
+        f"#SBATCH --time={options.time}",
+        "#SBATCH --requeue",
+        "#SBATCH --open-mode=append",
+        f"#SBATCH --output={place}/element-%a.log",
+        *([f"#SBATCH --partition={options.partition}"] if options.partition else []),
+        *(f"#SBATCH {extra}" for extra in options.extra),
+        *(f"export {name}=1" for name in THREAD_VARIABLES),
+        f'exec {shlex.quote(sys.executable)} -c {shlex.quote(program)} "$SLURM_ARRAY_TASK_ID"',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _sbatch(script: Path, wait: bool) -> str:
+    command = ["sbatch", "--parsable", *(["--wait"] if wait else []), str(script)]
+    told = subprocess.run(command, capture_output=True, text=True, check=False)
+    job = told.stdout.strip().split(";")[0]
+    if not job or (told.returncode != 0 and not wait):
+        raise SlurmError(f"sbatch refused {script}: {told.stderr.strip() or told.stdout.strip()}")
+    return job
