@@ -1,4 +1,4 @@
-"""An optimizer in one file of 30 lines is known everywhere by its name, and the package is not
+"""An optimizer in one file that fits on a page is known everywhere by its name, and the package is not
 touched."""
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ NAME = "evolution-strategy"
 LOOPS = (
     "tests/optimize/test_contract.py",
     "tests/report/test_run_folder.py",
-    "tests/asoc/test_design.py",
+    "tests/systems/asoc/test_design.py",
 )
 SCENARIO = "problems/smdw/scenario_1_lateral.toml"
 
@@ -37,8 +37,8 @@ def run(*arguments: str, plugins: str = str(FILE)) -> subprocess.CompletedProces
     )
 
 
-def test_the_file_has_30_lines() -> None:
-    assert len(FILE.read_text(encoding="utf-8").splitlines()) <= 30
+def test_the_file_fits_on_a_page() -> None:
+    assert len(FILE.read_text(encoding="utf-8").splitlines()) <= 45
 
 
 def test_it_is_listed_and_made_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
