@@ -1,0 +1,326 @@
+"""A robot: the only kinematics and body data in the package, all from one description.
+
+From the rolling and sliding rows of its wheels a robot gets its inverse kinematics (body twist ->
+wheel rates) and its forward kinematics (wheel rates -> body twist, least squares). Per-wheel arrays
+are over ``wheels``: every wheel whose spin follows from the body's motion, in the order of the
+file. Castors that no motor drives and balls carry load only and are not among them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.robots.description import RobotDescription, WheelSection
+from trajopt.robots.wheel import Row, Wheel, WheelKind
+from trajopt.schema import read_tables, set_key, validated
+
+Array = NDArray[np.float64]
+
+STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
+DATA = Path(__file__).parent / "data"  # the shipped robots
+
+
+@dataclass(frozen=True)
+class Body:
+    """Rigid body data for slip and tip limits, SI units.
+
+    ``contacts`` (C, 2) are the points on the ground that carry load, in the body frame (m); ``cog``
+    is the centre of gravity (x, y, height) in the same frame. ``roller_axis`` (C,) is the angle
+    (rad, body frame) of the ground roller's axis at each contact, NaN where the tyre transmits
+    force in every direction. ``driven`` (C,) says which contacts transmit traction at all (a free
+    castor carries load only).
+    """
+
+    mass: float
+    yaw_inertia: float
+    cog: tuple[float, float, float]
+    contacts: tuple[tuple[float, float], ...]
+    roller_axis: tuple[float, ...]
+    driven: tuple[bool, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Robot:
+    """Wheels on a body, from a ``description`` (see ``trajopt.robots.description``).
+
+    Made by ``robot("loc8")``, ``Robot.load("mine.toml")`` or a builder such as
+    ``Robot.differential``.
+
+    >>> from trajopt.robots import robot
+    >>> robot("loc8").inverse.shape
+    (4, 3)
+    """
+
+    description: RobotDescription
+
+    def __repr__(self) -> str:
+        kinds = [wheel.kind for wheel in self.description.wheels]
+        counts = ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
+        return f"Robot({self.name!r}, {self.body.mass:g} kg, wheels: {counts})"
+
+    @classmethod
+    def load(cls, file: str | Path, overrides: Mapping[str, Any] | None = None) -> Robot:
+        """Robot of a TOML file; ``overrides`` maps dotted keys to values, where an element of an
+        array is named (``{"motors.all.torque": 4.0, "wheels.left.radius": 0.1}``).
+
+        Raises ProblemError in one line: file, key, value, and what would be right.
+        """
+        return cls(validated(RobotDescription, read_tables(file, overrides), str(file)))
+
+    @classmethod
+    def of(cls, tables: Mapping[str, Any], source: str = "<robot>") -> Robot:
+        """Robot of the tables that a file would hold. Raises ProblemError."""
+        return cls(validated(RobotDescription, tables, source))
+
+    def replace(self, changes: Mapping[str, Any]) -> Robot:
+        """Copy with changed dotted keys ({"body.mass": 20.0}), checked like a file; None takes a
+        key out. Raises ProblemError."""
+        data = self.description.model_dump(mode="json", exclude_none=True)
+        for key, value in changes.items():
+            set_key(data, key, value, self.description.source)
+        return Robot.of(data, self.description.source)
+
+    # -- what the description says ---------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        return self.description.name
+
+    @cached_property
+    def driven(self) -> tuple[str, ...]:
+        """Names of the wheels that a motor drives, in the order of ``wheels``."""
+        motors = {name for motor in self.description.motors for name in motor.wheels}
+        return tuple(name for name in self.wheel_names if name in motors)
+
+    @cached_property
+    def rolling(self) -> tuple[WheelSection, ...]:
+        """Descriptions of ``wheels``."""
+        motors = {name for motor in self.description.motors for name in motor.wheels}
+        kinds = ("fixed", "steered", "swedish")
+        return tuple(w for w in self.description.wheels if w.kind in kinds or w.name in motors)
+
+    @property
+    def wheel_names(self) -> tuple[str, ...]:
+        """Names of ``wheels``."""
+        return tuple(wheel.name for wheel in self.rolling)
+
+    @cached_property
+    def wheels(self) -> tuple[Wheel, ...]:
+        """Rolling and sliding rows of the wheels, in the order of every per-wheel array."""
+        return tuple(kinematic(wheel) for wheel in self.rolling)
+
+    def motor_array(self, key: str) -> Array:
+        """(W,): ``torque``, ``speed`` or ``acceleration`` of each wheel's motor, inf without."""
+        found = dict.fromkeys(self.wheel_names, math.inf)
+        for motor in self.description.motors:
+            value = getattr(motor, key)
+            found.update(dict.fromkeys(motor.wheels, math.inf if value is None else value))
+        return np.array([found[name] for name in self.wheel_names])
+
+    @cached_property
+    def body(self) -> Body:
+        """Masses and contacts for the limits: a contact a wheel, in the order of the file."""
+        motors = {name for motor in self.description.motors for name in motor.wheels}
+        wheels, section = self.description.wheels, self.description.body
+        axes = tuple(w.angle + w.rollers.angle if w.rollers else math.nan for w in wheels)
+        return Body(
+            section.mass,
+            self.yaw_inertia,
+            section.cog,
+            tuple(wheel.contact for wheel in wheels),
+            axes,
+            tuple(wheel.name in motors for wheel in wheels),
+        )
+
+    @property
+    def yaw_inertia(self) -> float:
+        """About the centre of gravity, kg m^2; what the file leaves out follows from masses: the
+        chassis as a plate, wheels and pivots as points."""
+        section = self.description.body
+        if section.yaw_inertia is not None:
+            return section.yaw_inertia
+        x, y, _ = section.cog
+        parts = [(w.mass, *w.contact) for w in self.description.wheels]
+        places = {w.name: w.position for w in self.description.wheels}
+        parts += [(p.mass, *places[p.wheels[0]]) for p in self.description.pivots]
+        rest = section.mass - sum(part[0] for part in parts)
+        length, width, _ = section.chassis
+        plate = rest * (length**2 + width**2) / 12
+        px, py = section.chassis_place
+        parts.append((rest, px, py))
+        return plate + sum(m * ((a - x) ** 2 + (b - y) ** 2) for m, a, b in parts)
+
+    @cached_property
+    def footprint(self) -> tuple[tuple[float, float], ...]:
+        """(K, 2): corners of the outline in the body frame, counter-clockwise, m."""
+        section = self.description.body
+        if section.footprint is not None:
+            return section.footprint
+        (px, py), (length, width, _) = section.chassis_place, section.chassis
+        points = [(px + i * length / 2, py + j * width / 2) for i in (-1, 1) for j in (-1, 1)]
+        points += [p for wheel in self.description.wheels for p in _outline(wheel)]
+        (x0, y0), (x1, y1) = np.min(points, axis=0).tolist(), np.max(points, axis=0).tolist()
+        return ((x1, y1), (x0, y1), (x0, y0), (x1, y0))
+
+    # -- kinematics --------------------------------------------------------------------------------
+
+    @property
+    def holonomic(self) -> bool:
+        """Whether every body twist is possible without turning a wheel first."""
+        return int(self.admissible.shape[1]) == 3
+
+    @cached_property
+    def _rows(self) -> list[Row]:
+        if self.description.skid is None:
+            return [wheel.driving() for wheel in self.wheels]
+        half = self.description.skid.effective_track / 2
+        return [
+            Row(1.0, 0.0, -half if wheel.position[1] > 0 else half, wheel.radius)
+            for wheel in self.wheels
+        ]
+
+    @cached_property
+    def inverse(self) -> Array:
+        """(W, 3): wheel rates (rad/s) = inverse @ (vx, vy, wz), from the rolling rows.
+
+        Steered wheels and castors stand at their own ``beta``; mobility.inverse_at takes other
+        angles.
+        """
+        rows = [[r.x / r.spin, r.y / r.spin, r.yaw / r.spin] for r in self._rows]
+        matrix = np.array(rows, dtype=np.float64).reshape(-1, 3)
+        if matrix.size:
+            matrix[np.abs(matrix) < 1e-12 * np.abs(matrix).max()] = 0.0
+        return matrix
+
+    @cached_property
+    def forward(self) -> Array:
+        """(3, W): body twist = forward @ wheel rates; exact when wheels agree, least squares
+        otherwise. The constrained directions (sliding rows of wheels that may not slide) are
+        imposed exactly."""
+        allowed = self.admissible
+        return np.asarray(allowed @ np.linalg.pinv(self.inverse @ allowed), dtype=np.float64)
+
+    @cached_property
+    def admissible(self) -> Array:
+        """(3, m): orthonormal basis of the body twists that no sliding row forbids (m =
+        mobility)."""
+        if self.description.skid is not None:
+            return np.eye(3)[:, [0, 2]]
+        rows = [w.sliding() for w in self.wheels]
+        # a castor gives way by steering
+        constraints = [[r.x, r.y, r.yaw] for r in rows if not r.free and r.steer == 0]
+        if not constraints:
+            return np.eye(3)
+        _, singular, vt = np.linalg.svd(np.array(constraints, dtype=np.float64))
+        rank = int(np.sum(singular > 1e-9 * singular.max()))
+        return np.asarray(vt[rank:].T, dtype=np.float64)
+
+    @cached_property
+    def turning_length(self) -> float:
+        """m; weighs yaw against translation in the path parameter of robots that can turn on the
+        spot, sqrt(dx^2 + dy^2 + (L dpsi)^2): the largest distance of a wheel from the origin."""
+        return float(max(w.l for w in self.wheels))
+
+    def require_rolling(self, twist: Array, places: Array) -> None:
+        """Raises InfeasibleError where the wheels forbid a body twist (N, 3) at path parameters
+        (N,), m."""
+        slipping = twist - twist @ self.admissible @ self.admissible.T
+        bad = np.abs(slipping).max(axis=1) > 1e-6 * np.abs(twist).max(axis=1)
+        if not bad.any():
+            return
+        steered = [w.name for w in self.rolling if w.kind == "steered"]
+        why = f"the wheels of '{self.name}' cannot roll along this path; "
+        if steered:
+            why += (
+                f"its steered wheels ({', '.join(steered)}) stand at their start angle, and motions "
+                "that steer are not planned: only straight ones"
+            )
+        elif self.admissible.shape[1] == 1 and all(w.kind == "fixed" for w in self.rolling):
+            why += "they forbid every turn: give [skid] with an effective track"
+        else:
+            why += "leave its heading to the direction of travel"
+        raise InfeasibleError("rolling", float(places[int(np.argmax(bad))]), why)
+
+    # -- builders ----------------------------------------------------------------------------------
+
+    @classmethod
+    def differential(cls, **sizes: Any) -> Robot:
+        """Two driven wheels on one axle and a free castor; see ``builders.differential``."""
+        return cls.of(_builder("differential")(**sizes))
+
+    @classmethod
+    def car(cls, **sizes: Any) -> Robot:
+        """Two fixed rear wheels, two steered front wheels; see ``builders.car``."""
+        return cls.of(_builder("car")(**sizes))
+
+    @classmethod
+    def mecanum(cls, **sizes: Any) -> Robot:
+        """Four Mecanum wheels; see ``builders.mecanum``."""
+        return cls.of(_builder("mecanum")(**sizes))
+
+    @classmethod
+    def omni(cls, **sizes: Any) -> Robot:
+        """Omni wheels evenly around the centre; see ``builders.omni``."""
+        return cls.of(_builder("omni")(**sizes))
+
+    @classmethod
+    def swerve(cls, **sizes: Any) -> Robot:
+        """Four driven, steered wheels; see ``builders.swerve``."""
+        return cls.of(_builder("swerve")(**sizes))
+
+
+def robot(name: str, overrides: Mapping[str, Any] | None = None) -> Robot:
+    """The shipped robot called ``name``, with changed keys as in ``Robot.load``.
+
+    Raises ArgumentError for an unknown name, ProblemError for a wrong key.
+    """
+    if name not in robot_names():
+        raise ArgumentError("robot.name", name, "one of " + ", ".join(robot_names()))
+    return Robot.load(DATA / f"{name}.toml", overrides)
+
+
+def robot_names() -> tuple[str, ...]:
+    """Names of the shipped robots."""
+    return tuple(sorted(file.stem for file in DATA.glob("*.toml")))
+
+
+def kinematic(wheel: WheelSection) -> Wheel:
+    """Rolling and sliding rows of a described wheel at steering angle 0."""
+    x, y = wheel.position
+    alpha = math.atan2(y, x)
+    return Wheel(
+        WheelKind(wheel.kind),
+        math.hypot(x, y),
+        alpha,
+        wheel.angle + math.pi / 2 - alpha,
+        wheel.radius,
+        gamma=wheel.rollers.angle if wheel.rollers else 0.0,
+        offset=-wheel.trail,
+        lateral=wheel.lateral,
+    )
+
+
+def _outline(wheel: WheelSection) -> list[tuple[float, float]]:
+    """Corners of a wheel seen from above, at every steering angle where it turns, m."""
+    if wheel.kind in ("steered", "castor"):
+        x, y = wheel.position
+        reach = math.hypot(wheel.trail + wheel.radius, abs(wheel.lateral) + wheel.width / 2)
+        return [(x + i * reach, y + j * reach) for i in (-1, 1) for j in (-1, 1)]
+    (x, y), cos, sin = wheel.contact, math.cos(wheel.angle), math.sin(wheel.angle)
+    corners = [(i * wheel.radius, j * wheel.width / 2) for i in (-1, 1) for j in (-1, 1)]
+    return [(x + a * cos - b * sin, y + a * sin + b * cos) for a, b in corners]
+
+
+def _builder(name: str) -> Any:
+    from trajopt.robots import builders
+
+    return getattr(builders, name)

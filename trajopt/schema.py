@@ -1,0 +1,187 @@
+"""Strict models of TOML files: reading, changing keys, and errors in one line.
+
+Problem files and robot files go through here. A model is a frozen ``Section`` that refuses keys it
+does not know; whatever is wrong becomes a ProblemError that names file, key, value and what would
+be right.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic_core import PydanticCustomError
+
+from trajopt.errors import ProblemError
+
+Model = TypeVar("Model", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(gt=0, le=1)]
+Point = tuple[float, float]
+Point3 = tuple[float, float, float]
+
+LARGEST_FILE = 4_000_000  # bytes of a TOML file; chosen, a thousand times the shipped ones
+EVERY = "all"  # as a name in a dotted key: every element of an array of tables
+
+
+class Section(BaseModel):
+    """A table of a file: frozen, finite numbers, no unknown keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
+    """A broken rule of a section; carried through pydantic to become a ProblemError."""
+    return PydanticCustomError(
+        "trajopt_rule", "{expected}", {"key": key, "given": value, "expected": expected}
+    )
+
+
+def read_tables(path: str | Path, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Tables of a TOML file with ``overrides`` (dotted keys) applied. Raises ProblemError."""
+    try:
+        if Path(path).stat().st_size > LARGEST_FILE:
+            raise ProblemError(
+                str(path), "file", f"{Path(path).stat().st_size} bytes", f"up to {LARGEST_FILE}"
+            )
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ProblemError(str(path), "file", "missing", "an existing file (*.toml)") from None
+    except IsADirectoryError:
+        raise ProblemError(str(path), "file", "a directory", "a file (*.toml)") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise ProblemError(str(path), "file", str(error), "valid TOML in UTF-8") from None
+    except (OSError, TypeError, ValueError) as error:
+        if isinstance(error, ProblemError):
+            raise
+        raise ProblemError(str(path), "file", str(error), "a readable file (*.toml)") from None
+    for key, value in (overrides or {}).items():
+        set_key(data, key, value, str(path))
+    return data
+
+
+def set_key(data: dict[str, Any], dotted: str, value: Any, file: str) -> None:
+    """Set a nested key, making tables on the way; None takes it out.
+
+    An element of an array of tables is named by its ``name``, by its number from 0, or by ``all``.
+    Unknown names of keys are left to validation. Raises ProblemError for a key below no table.
+    """
+    *parents, last = dotted.split(".")
+    for table in _tables(data, parents, dotted, value, file):
+        if value is None:
+            table.pop(last, None)
+        else:
+            table[last] = value
+
+
+def _tables(
+    table: Any, keys: list[str], dotted: str, value: Any, file: str
+) -> Iterator[dict[str, Any]]:
+    for depth, key in enumerate(keys):
+        table = table.setdefault(key, {}) if isinstance(table, dict) else table
+        if isinstance(table, (list, tuple)) and depth + 1 <= len(keys):
+            rest = keys[depth + 1 :]
+            yield from _elements(table, rest, dotted, value, file)
+            return
+        if not isinstance(table, dict):
+            none = ".".join(keys[: depth + 1])
+            raise ProblemError(file, dotted, value, f"a key below a table ({none} is none)")
+    yield table
+
+
+def _elements(
+    array: Any, rest: list[str], dotted: str, value: Any, file: str
+) -> Iterator[dict[str, Any]]:
+    """Tables below the elements of an array of tables that the first of ``rest`` chooses."""
+    names = [e.get("name", str(i)) if isinstance(e, dict) else str(i) for i, e in enumerate(array)]
+    chosen = [
+        element
+        for i, element in enumerate(array)
+        if rest and rest[0] in (EVERY, names[i], str(i)) and isinstance(element, dict)
+    ]
+    if not chosen:
+        raise ProblemError(
+            file, dotted, value, f"one of {', '.join([EVERY, *names])} after the array's name"
+        )
+    for element in chosen:
+        yield from _tables(element, rest[1:], dotted, value, file)
+
+
+def validated(model: type[Model], data: Mapping[str, Any], file: str) -> Model:
+    """``data`` as a model with its ``source`` set. Raises ProblemError in one line."""
+    if "source" in data:
+        raise ProblemError(file, "source", data["source"], "no such key: it is set by the loader")
+    try:
+        # Through JSON, because only there does strict mode take arrays for tuples.
+        text = json.dumps({**data, "source": file}, default=_as_json)
+        return model.model_validate_json(text, strict=True)
+    except ValidationError as error:
+        raise translated(error, file, model) from None
+    except (RecursionError, ValueError) as error:
+        if isinstance(error, ProblemError):
+            raise
+        raise ProblemError(file, "file", str(error), "tables of plain values") from None
+
+
+def translated(error: ValidationError, file: str, model: type[BaseModel]) -> ProblemError:
+    """One line for the first finding, in the words of the files."""
+    first = error.errors()[0]
+    place = [str(part) for part in first["loc"]]
+    if first["type"] == "trajopt_rule":
+        context = first["ctx"]
+        key = ".".join(part for part in (_joined(first["loc"]), context["key"]) if part)
+        return ProblemError(file, key, context["given"], context["expected"])
+    key = _joined(first["loc"])
+    if first["type"] == "extra_forbidden":
+        known = known_keys(place[:-1], model)
+        near = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.0)
+        return ProblemError(file, key, first["input"], f"a known key; the nearest is '{near[0]}'")
+    if first["type"] == "missing":
+        return ProblemError(file, key, "missing", "this key to be given")
+    message = first["msg"].removeprefix("Input should be ").replace("a valid array", "an array")
+    message = message.replace("an object", "a table")  # what JSON calls an object
+    if first["type"] == "too_long":
+        message = (
+            f"at most {first['ctx']['max_length']} values, not {first['ctx']['actual_length']}"
+        )
+    return ProblemError(file, key, first["input"], message[0].lower() + message[1:])
+
+
+def json_schema(model: type[BaseModel]) -> str:
+    """JSON schema of a kind of file, for editors."""
+    schema = model.model_json_schema()
+    schema["properties"].pop("source", None)
+    return json.dumps(schema, indent=2) + "\n"
+
+
+def known_keys(section: list[str], whole: type[BaseModel]) -> list[str]:
+    """Keys of the section at a place of a file; numbers are elements of arrays of tables."""
+    model: Any = whole
+    for name in section:
+        if name.isdigit() or name not in getattr(model, "model_fields", {}):
+            continue  # an element of an array, or the tag of a union
+        model = model.model_fields[name].annotation
+        while get_origin(model) in (tuple, Union, UnionType, Annotated):
+            model = next(a for a in get_args(model) if a is not type(None))
+    return [key for key in getattr(model, "model_fields", {"": None}) if key != "source"]
+
+
+def _as_json(value: Any) -> Any:
+    """NumPy values and sections as JSON; anything else as text, which validation then refuses."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json", exclude_none=True)
+    return value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def _joined(location: tuple[int | str, ...]) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else (f".{part}" if text else part)
+    return text

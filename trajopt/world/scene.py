@@ -1,0 +1,32 @@
+"""Where a robot drives: the ground with its friction, and what stands on it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from trajopt.errors import ArgumentError
+from trajopt.world.obstacles import Obstacle
+from trajopt.world.terrain import Terrain
+
+
+@dataclass(frozen=True)
+class Scene:
+    """``friction`` (coefficient between wheels and ground), the ``ground``'s shape (``Flat()``, a
+    ``Ramps`` or a ``HeightMap``), and ``obstacles`` that stand on it.
+
+    Raises ArgumentError for a friction at which no wheel drives.
+    """
+
+    friction: float
+    ground: Terrain
+    obstacles: tuple[Obstacle, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.friction) and self.friction > 0):
+            raise ArgumentError("scene.friction", self.friction, "a coefficient > 0")
+        if not hasattr(self.ground, "height"):
+            raise ArgumentError("scene.ground", self.ground, "the shape of the ground, as Flat()")
+        names = [obstacle.name for obstacle in self.obstacles]
+        if len(set(names)) < len(names):
+            raise ArgumentError("scene.obstacles", names, "obstacles with different names")
