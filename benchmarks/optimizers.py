@@ -15,18 +15,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.progress import track
 
 from benchmarks.common import PROBLEMS, ResultTable, publish
+from trajopt.arrays import Array
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective, with_free
 from trajopt.optimize.base import Budget, OptimizeResult
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 from trajopt.problem.search import Problem, load_problem, problem_kind
-
-Array = NDArray[np.float64]
 
 PACKAGES = ("trajopt", "numpy", "scipy", "numba", "casadi", "pyswarms")
 EQUAL = 1e-9  # costs below this count as equal, chosen: exact to rounding

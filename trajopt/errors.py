@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 
 class TrajoptError(Exception):
     """Base of every error that trajopt raises on purpose."""
@@ -75,20 +72,6 @@ class MissingDependencyError(TrajoptError, ImportError):
 
 class SimulationError(TrajoptError):
     """A physics engine could not run the scene, or its result is not a motion (NaN, explosion)."""
-
-
-def as_numbers(argument: str, value: Any, expected: str) -> NDArray[np.float64]:
-    """``value`` as an array of real numbers. Raises ArgumentError, saying what was ``expected``,
-    where it is none."""
-    try:
-        array = np.asarray(value)
-        if (
-            array.dtype.kind in "biuf" or array.dtype == object or array.size == 0
-        ):  # no text, no complex numbers
-            return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        pass
-    raise ArgumentError(argument, value, expected) from None
 
 
 def _short(value: Any, limit: int = 120) -> str:

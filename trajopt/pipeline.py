@@ -7,12 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, fold
 from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.duration import DurationObjective
-from trajopt.objectives.terminal import TerminalObjective, folded, terminal_objective
+from trajopt.objectives.terminal import TerminalObjective, terminal_objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
@@ -23,8 +24,6 @@ from trajopt.simulate.check import ValidationReport, drive_trajectory
 from trajopt.timing.nominal import nominal_timing
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 MARGIN = -1e-9  # least relative margin of a trajectory that keeps its limits
 
@@ -249,7 +248,7 @@ def _final_deviation(
     wheels = np.asarray(problem.start.wheels) + travel - np.asarray(problem.goal.wheels)
     turns = 2 * np.pi * np.round((pose[2] - problem.goal.pose[2]) / (2 * np.pi))
     error = pose - np.array([*problem.goal.pose[:2], problem.goal.pose[2] + turns])
-    return error, np.asarray(folded(wheels, problem.objective.period))
+    return error, np.asarray(fold(wheels, problem.objective.period))
 
 
 def _dead_zone_effect(problem: Problem, trajectory: Trajectory | None) -> Array:

@@ -15,9 +15,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.common import PROBLEMS, ResultTable, publish
+from trajopt.arrays import Array
 from trajopt.objectives import compiled
 from trajopt.objectives.rollout import step_grid
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective, with_free
@@ -25,8 +25,6 @@ from trajopt.optimize.base import Budget
 from trajopt.optimize.pso import ParticleSwarm
 from trajopt.optimize.search import minimize
 from trajopt.problem.search import Problem, load_problem
-
-Array = NDArray[np.float64]
 
 PACKAGES = ("trajopt", "numpy", "numba", "pyswarms", "pymoo")
 PARTICLES, ITERATIONS = 50, 500  # thesis 000, Table 5.8

@@ -16,9 +16,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.common import OUT, ResultTable, publish
+from trajopt.arrays import Array
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
@@ -34,8 +34,6 @@ from trajopt.timing.compiled import compiled_profile, fastest_profiles
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import Stages, assemble
 from trajopt.timing.toppra import toppra_profile
-
-Array = NDArray[np.float64]
 
 FIGURES = OUT / "time_scaling"
 PACKAGES = ("trajopt", "numpy", "numba", "toppra", "copp-py")

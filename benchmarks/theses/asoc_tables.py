@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.common import OUT, ResultTable, publish
 from benchmarks.theses.asoc_reference import (
@@ -41,6 +40,7 @@ from benchmarks.theses.asoc_tables_tracking import (
     runs,
     tables_9_and_10,
 )
+from trajopt.arrays import Array
 from trajopt.errors import TrajoptError
 from trajopt.optimize.base import Budget, Optimizer
 from trajopt.optimize.ipopt import Ipopt
@@ -71,8 +71,6 @@ from trajopt.systems.asoc.run import AsocRun
 from trajopt.systems.asoc.soil import soil_named
 from trajopt.systems.asoc.suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from trajopt.systems.asoc.tracking import Knowledge
-
-Array = NDArray[np.float64]
 
 PACKAGES = ("trajopt", "numpy", "scipy", "casadi", "pymoo", "mujoco", "pybullet")
 FIGURES = OUT / "asoc"

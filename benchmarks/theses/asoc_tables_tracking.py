@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.common import ResultTable
 from benchmarks.theses.asoc_reference import TABLE_9, TABLE_10
+from trajopt.arrays import Array
 from trajopt.errors import SimulationError
 from trajopt.systems.asoc.bullet import asoc_in_pybullet
 from trajopt.systems.asoc.modules import AsocGeometry
@@ -21,7 +21,6 @@ from trajopt.systems.asoc.tracking import FRICTION, Knowledge, Tracking, track_m
 from trajopt.world.height_map import HeightMap
 from trajopt.world.rough import rough_ground
 
-Array = NDArray[np.float64]
 Errors = list[list[float]]  # RMS errors, m: one list a command, one entry a field
 
 GEOMETRY = AsocGeometry(4)

@@ -19,9 +19,9 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
+from trajopt.arrays import Array
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.search import minimize
 from trajopt.problem.search import load_problem
@@ -51,8 +51,6 @@ from trajopt.systems.smdw.trials import (
     four,
     step_scene,
 )
-
-Array = NDArray[np.float64]
 
 FILES = {0.035: "step_3_5cm.toml", 0.05: "step_5cm.toml"}
 NAMES = {"lateral left": "lateral", "forward -35 deg": "forward35", "forward -45 deg": "forward45"}

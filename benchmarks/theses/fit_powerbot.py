@@ -19,13 +19,12 @@ from pathlib import Path as FilePath
 
 import numpy as np
 import scipy.optimize
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.paths.path import Path
 from trajopt.robots.powerbot import FRICTION
 from trajopt.systems.powerbot.limits import GRAVITY
 
-Array = NDArray[np.float64]
 ROOT = FilePath(__file__).resolve().parents[2]
 TABLE = ROOT / "tests" / "data" / "powerbot" / "experiments.csv"
 TARGETS = (

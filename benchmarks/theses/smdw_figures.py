@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from benchmarks.common import OUT, PROBLEMS
 from benchmarks.theses import closed_loop, smdw_printed
@@ -40,8 +39,6 @@ from trajopt.systems.smdw.trial_pictures import (
     phase_map_figure,
 )
 from trajopt.systems.smdw.trials import approach_command, step_scene
-
-Array = NDArray[np.float64]
 
 # Share of the thesis's ten runs that climbed, least and greatest (sections 6.1, 6.1.1, 6.2); "most"
 # is not counted.

@@ -17,7 +17,6 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from benchmarks.theses.climb import NAMES, THESIS
@@ -27,8 +26,6 @@ from trajopt.systems.smdw.climb import Climb, Outcome, judge, record_climb, wils
 from trajopt.systems.smdw.planner import Configuration, configurations
 from trajopt.systems.smdw.problem import ManeuverProblem, load_maneuver
 from trajopt.systems.smdw.trials import critical_wheels, four, step_scene
-
-Array = NDArray[np.float64]
 
 DATA = Path(__file__).parent / "data" / "smdw"
 TABLES = {

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from benchmarks.common import PROBLEMS
-from trajopt.objectives.terminal import TerminalObjective, folded, terminal_objective
+from trajopt.arrays import Array, fold
+from trajopt.objectives.terminal import TerminalObjective, terminal_objective
 from trajopt.optimize.base import Budget, OptimizeResult
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path as RobotPath
@@ -28,8 +28,6 @@ from trajopt.systems.smdw.search_pictures import (
     searches_figure,
     swarms_figure,
 )
-
-Array = NDArray[np.float64]
 
 # rad/s, fitted to Table 5.5 (loosely): what the thesis's drives seem to have done
 ACTUATOR: dict[str, float | bool] = {
@@ -119,9 +117,7 @@ def first_cost(objective: TerminalObjective, values: Array) -> Array:
     end = objective.predict(values.T)
     pose = np.concatenate([end.x, end.y, end.yaw]).T - np.array(objective.problem.goal.pose)
     wheels = np.concatenate(end.wheels).T - np.array(objective.problem.goal.wheels)
-    return np.asarray(
-        np.abs(pose) @ FIRST_GAINS + FIRST_BETA * np.abs(folded(wheels, 2 * np.pi)).sum(axis=1)
-    )
+    return np.asarray(np.abs(pose) @ FIRST_GAINS + FIRST_BETA * np.abs(fold(wheels)).sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False)

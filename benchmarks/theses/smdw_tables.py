@@ -14,7 +14,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, provenance, publish
 from benchmarks.theses import smdw_printed
@@ -43,7 +42,8 @@ from benchmarks.theses.smdw_searches import (
     searches,
     swarms,
 )
-from trajopt.objectives.terminal import folded, terminal_cost, terminal_objective
+from trajopt.arrays import fold
+from trajopt.objectives.terminal import terminal_cost, terminal_objective
 from trajopt.optimize.search import minimize
 from trajopt.problem.search import WHEELS, Problem, load_problem
 from trajopt.report.style import in_style, save_figure
@@ -53,8 +53,6 @@ from trajopt.systems.smdw.geometry import CLOUD_POINTS, contact_offset, meet_ste
 from trajopt.systems.smdw.pictures import plans_figure
 from trajopt.systems.smdw.planner import plan_climb
 from trajopt.systems.smdw.problem import load_maneuver
-
-Array = NDArray[np.float64]
 
 FIRST_GOAL = (2.0, 0.75, math.pi / 2)  # m, m, rad: Table 5.3
 EXACT = 1e-6  # cost up to which a search counts as exact
@@ -148,7 +146,7 @@ def tables_6(runs: Mapping[str, Driven]) -> ResultTable:
             ("thesis", thesis - np.array(TARGETS[1][NAMES[name]]), phases),
             ("exact plan, open loop", ours, wheels),
         ):
-            worst = np.abs(folded(turned, 2 * math.pi))
+            worst = np.abs(fold(turned))
             rows.append(
                 (
                     name,

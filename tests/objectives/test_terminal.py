@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from smdw_problems import ROOT, smdw_problem
 
+from trajopt.arrays import fold
 from trajopt.errors import ArgumentError
 from trajopt.objectives.rollout import Kinematics, roll_out, step_grid
 from trajopt.objectives.terminal import (
     TerminalObjective,
-    folded,
     on_grid,
     terminal_cost,
     terminal_objective,
@@ -58,7 +58,7 @@ def test_recomputes_figures_5_15_to_5_22():
 @given(st.floats(-50, 50), st.sampled_from([np.pi, 2 * np.pi]))
 def test_folding_is_the_circular_distance(angle, period):
     brute = min(abs(angle - period * k) for k in range(-20, 21))
-    assert abs(folded(angle, period)) == pytest.approx(brute, abs=1e-12)
+    assert abs(fold(angle, period)) == pytest.approx(brute, abs=1e-12)
 
 
 def with_actuator(problem, *free):

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.bench.peers import equal_pyswarms
 from trajopt.bench.profiles import holm, no_worse
 from trajopt.optimize.base import Budget, Optimizer
@@ -18,7 +18,6 @@ from trajopt.optimize.search import minimize
 
 pytest.importorskip("pyswarms")
 
-Array = NDArray[np.float64]
 
 SEEDS, DIMENSION, EVALUATIONS, LEVEL = 25, 6, 5_000, 0.05
 BOX = np.tile([-3.0, 5.0], (DIMENSION, 1))  # optima off the middle

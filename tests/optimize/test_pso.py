@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.optimize import swarm as swarm_module
 from trajopt.optimize.base import Budget, Status
@@ -26,8 +26,6 @@ from trajopt.optimize.pso import (
 )
 from trajopt.optimize.search import minimize
 from trajopt.optimize.swarm import Swarm
-
-Array = NDArray[np.float64]
 
 BOX = np.array([[-4.0, 5.0], [-3.0, 6.0], [-1.0, 2.0]])
 OPTIONS = [

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajopt.bench.problems import (
     BenchProblem,
@@ -38,8 +37,6 @@ from trajopt.sweeps.cases import Case
 from trajopt.sweeps.drive import Progress
 from trajopt.sweeps.store import Store
 from trajopt.sweeps.sweeps import sweep
-
-Array = NDArray[np.float64]
 
 TARGETS = tuple(
     10.0**-k for k in range(1, 10)

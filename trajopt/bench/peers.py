@@ -12,13 +12,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
 from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds
-
-Array = NDArray[np.float64]
 
 _LARGE = 1e100  # stands for an infeasible evaluation
 EXAMPLE = {"c1": 0.5, "c2": 0.3, "w": 0.9}  # pyswarms 1.3 documentation, "Basic Optimization"

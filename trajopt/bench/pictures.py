@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.bench.profiles import data_profile, ecdf, holm, performance_profile
 from trajopt.bench.tables import GRADIENT_METHODS, NEAR, SOLVED, BenchTables, Share
 from trajopt.report.style import (
@@ -27,8 +27,6 @@ from trajopt.report.style import (
     new_figure,
 )
 from trajopt.sweeps.store import Store
-
-Array = NDArray[np.float64]
 
 _COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK, GREY)
 _DASHES = ("-", "--", ":")

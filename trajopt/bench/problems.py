@@ -18,14 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.objectives.base import Capability, Evaluation, Objective
 from trajopt.optimize.functions import FunctionObjective
 from trajopt.optimize.plugins import mapping_of_file
-
-Array = NDArray[np.float64]
 
 CLASSICAL = (
     "ackley",

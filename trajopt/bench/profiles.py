@@ -11,11 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, BoolArray
 from trajopt.errors import ArgumentError
-
-Array = NDArray[np.float64]
 
 
 def time_to_targets(used: ArrayLike, cost: ArrayLike, targets: ArrayLike) -> Array:
@@ -146,7 +145,7 @@ def _median(values: Array) -> float:
     return float(high if not np.isfinite(high) else (low + high) / 2)
 
 
-def _share(hit: NDArray[np.bool_], table: Array) -> Array:
+def _share(hit: BoolArray, table: Array) -> Array:
     """(optimizers,): mean of ``hit`` over everything else, where the table is not NaN; NaN without
     entries."""
     present = ~np.isnan(table)

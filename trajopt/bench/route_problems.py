@@ -8,7 +8,6 @@ from pathlib import Path as FilePath
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
@@ -25,8 +24,6 @@ from trajopt.robots.powerbot import (
     WIDTH,
     powerbot,
 )
-
-Array = NDArray[np.float64]
 
 RADIUS = math.hypot(
     REAR, WIDTH / 2

@@ -10,13 +10,12 @@ from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.bench.comparison import TARGETS, best_costs
 from trajopt.bench.profiles import RunningTime, expected_running_time, no_worse, time_to_targets
 from trajopt.errors import ArgumentError
 
-Array = NDArray[np.float64]
 Row = Mapping[str, Any]
 Unit = Literal["evaluations", "evaluations and gradients", "seconds"]
 

@@ -15,15 +15,14 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold
 from trajopt.control.bend import TAIL_STRETCH, Goal, Reference, eased, reference_of, resolved
 from trajopt.errors import ArgumentError
 from trajopt.robots.platform import Platform
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import FreeGround
 
-Array = NDArray[np.float64]
 Mode = Literal["pose and phase", "pose", "wheel servo"]
 
 RESOLVE_EVERY = (
@@ -96,7 +95,7 @@ def correct(estimate: Estimate, measured: Array, sensors: Sensors) -> Estimate:
     noise = np.diag(np.maximum([sensors.position, sensors.position, sensors.yaw], 1e-6) ** 2)
     gain = estimate.covariance @ np.linalg.inv(estimate.covariance + noise)
     error = measured - estimate.pose
-    error[2] = (error[2] + math.pi) % (2 * math.pi) - math.pi
+    error[2] = fold(error[2])
     return Estimate(estimate.pose + gain @ error, (np.eye(3) - gain) @ estimate.covariance)
 
 

@@ -14,13 +14,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.robots.platform import Platform
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import FreeGround
-
-Array = NDArray[np.float64]
 
 WHEEL_WEIGHT = (
     0.015  # rad, residual of a critical wheel that counts 1, from a prototype of this law

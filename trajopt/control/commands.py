@@ -13,13 +13,11 @@ from pathlib import Path as FilePath
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.robots.platform import Platform
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _SMALL_TURN = 1e-9  # rad in one step below which a step is straight
 _FINE = 0.01  # s between points where speeds are compared; chosen
@@ -82,8 +80,7 @@ def commands(
     planned angles. The last interval is stretched to whole samples and holds what is left. Raises
     ArgumentError for a sample time that is not positive, or a robot that is no differential drive.
     """
-    if not (np.isfinite(sample_time) and sample_time > 0):
-        raise ArgumentError("sample_time", sample_time, "a finite time > 0 s")
+    require_positive("sample_time", sample_time, "s")
     if trajectory.duration / sample_time > _MOST_COMMANDS:
         raise ArgumentError(
             "sample_time",
@@ -169,7 +166,7 @@ def compare_log(trajectory: Trajectory, file: str | FilePath) -> Comparison:
     inside = t <= trajectory.duration
     planned = trajectory.at(np.minimum(t, trajectory.duration))
     speed = np.where(inside, planned.twist[:, 0], 0.0)
-    heading = _folded(log[:, 3] - planned.pose[:, 2])
+    heading = fold(log[:, 3] - planned.pose[:, 2])
     steps = np.hypot(np.diff(log[:, 1]), np.diff(log[:, 2]))
     return Comparison(
         float(np.sqrt(np.mean((log[:, 4] - speed) ** 2))),
@@ -226,7 +223,3 @@ def _arc(yaw: Array, v: Array, w: Array, t: Array) -> Array:
     half = turn / 2
     chord = v * t * np.where(straight, 1.0, np.sin(half) / np.where(straight, 1.0, half))
     return np.column_stack([chord * np.cos(yaw + half), chord * np.sin(yaw + half)])
-
-
-def _folded(angle: Array) -> Array:
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

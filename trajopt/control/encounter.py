@@ -11,15 +11,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, require_finite, require_not_negative, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit, Rows
 from trajopt.paths.samples import sample_path
 from trajopt.robots.platform import Platform
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _SPACING = 0.01  # m between table entries; chosen
 _FLAT = 1e-12  # a row with a smaller coefficient of s'' does not bound it
@@ -38,11 +36,9 @@ class Obstacle:
     deviation: float = 0.0
 
     def __post_init__(self) -> None:
-        if not np.all(np.isfinite([*self.centre, *self.velocity])):
-            raise ArgumentError("obstacle", self, "finite numbers")
+        require_finite("obstacle", [*self.centre, *self.velocity])
         for name in ("radius", "deviation"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ArgumentError(f"obstacle.{name}", getattr(self, name), "a finite value >= 0")
+            require_not_negative(f"obstacle.{name}", getattr(self, name))
 
 
 World = Callable[
@@ -68,11 +64,9 @@ class Visitor:
 
     def __post_init__(self) -> None:
         for name in ("appears", "stays", "distance", "radius"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ArgumentError(f"visitor.{name}", getattr(self, name), "a finite value >= 0")
+            require_not_negative(f"visitor.{name}", getattr(self, name))
         for name in ("aside", "speed"):
-            if not np.isfinite(getattr(self, name)):
-                raise ArgumentError(f"visitor.{name}", getattr(self, name), "a finite value")
+            require_finite(f"visitor.{name}", getattr(self, name))
 
 
 def visited_world(
@@ -235,10 +229,8 @@ def safe_speed(
     still is not far enough. Raises ArgumentError for values that are not positive.
     """
     for name, value in (("sensor_range", sensor_range), ("delay", delay), ("braking", braking)):
-        if not (np.isfinite(value) and value > 0):
-            raise ArgumentError(name, value, "a finite value > 0")
-    if not (np.isfinite(obstacle_speed) and obstacle_speed >= 0):
-        raise ArgumentError("obstacle_speed", obstacle_speed, "a finite speed >= 0 m/s")
+        require_positive(name, value)
+    require_not_negative("obstacle_speed", obstacle_speed, "m/s")
     room = sensor_range - obstacle_speed * delay
     if room <= 0:
         return 0.0

@@ -15,12 +15,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, require_not_negative, require_positive
 from trajopt.control.encounter import Course, Obstacle, World, clearance
 from trajopt.errors import ArgumentError
-
-Array = NDArray[np.float64]
 
 TIME_STEP = 0.02  # s between samples of a plan; chosen
 # Shares of full braking (< 0) and full acceleration (> 0) tried a cycle; chosen: fine near a
@@ -46,11 +44,9 @@ class Sensor:
 
     def __post_init__(self) -> None:
         for name in ("reach", "scan_time"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ArgumentError(f"sensor.{name}", getattr(self, name), "a finite value > 0")
+            require_positive(f"sensor.{name}", getattr(self, name))
         for name in ("reaction_time", "unseen_speed"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ArgumentError(f"sensor.{name}", getattr(self, name), "a finite value >= 0")
+            require_not_negative(f"sensor.{name}", getattr(self, name))
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,14 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold, require_not_negative, require_positive
 from trajopt.control.commands import half_track
-from trajopt.errors import ArgumentError
 from trajopt.robots.platform import Platform
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -46,11 +43,9 @@ class Tracker:
 
     def __post_init__(self) -> None:
         for name in ("damping", "stiffness", "along", "wheel_speed"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ArgumentError(f"tracker.{name}", getattr(self, name), "a finite value > 0")
+            require_positive(f"tracker.{name}", getattr(self, name))
         for name in ("floor", "settle"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ArgumentError(f"tracker.{name}", getattr(self, name), "a finite value >= 0")
+            require_not_negative(f"tracker.{name}", getattr(self, name))
 
     def wheel_speeds(
         self, reference: Array, speed: tuple[float, float], pose: Array, width: float
@@ -60,7 +55,7 @@ class Tracker:
         dx, dy = reference[0] - pose[0], reference[1] - pose[1]
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         ex, ey = cos * dx + sin * dy, -sin * dx + cos * dy
-        turn = float((reference[2] - pose[2] + np.pi) % (2 * np.pi) - np.pi)
+        turn = float(fold(reference[2] - pose[2]))
         v_ref, w_ref = speed
         gain = max(
             2 * self.damping * float(np.sqrt(w_ref**2 + self.stiffness * v_ref**2)), self.floor
@@ -100,9 +95,7 @@ class Tracked:
     def errors(self) -> Array:
         """(N, 2): distance (m) and heading (rad) between robot and reference."""
         d = self.pose - self.reference
-        return np.column_stack(
-            [np.hypot(d[:, 0], d[:, 1]), np.abs((d[:, 2] + np.pi) % (2 * np.pi) - np.pi)]
-        )
+        return np.column_stack([np.hypot(d[:, 0], d[:, 1]), np.abs(fold(d[:, 2]))])
 
 
 def track(
@@ -121,8 +114,7 @@ def track(
     between. Raises ArgumentError for a sample time that is not positive or a robot that is no
     differential drive.
     """
-    if not (np.isfinite(sample_time) and sample_time > 0):
-        raise ArgumentError("sample_time", sample_time, "a finite time > 0 s")
+    require_positive("sample_time", sample_time, "s")
     width = 2 * half_track(robot)
     steps = int(np.ceil((trajectory.duration + (tracker.settle if tracker else 0.0)) / sample_time))
     times = sample_time * np.arange(steps + 1, dtype=np.float64)

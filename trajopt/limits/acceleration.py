@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.limits.limit import Rows, linear_rows, require_positive
+from trajopt.arrays import require_positive
+from trajopt.limits.limit import Rows, linear_rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
 

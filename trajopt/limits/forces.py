@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import STANDARD_GRAVITY, Body
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,12 +62,6 @@ def speed_rows(name: str, rate: Array, largest: float) -> Rows:
         sd2_max = (largest / rate) ** 2  # inf where the quantity does not move
     empty = np.zeros((len(rate), 0))
     return Rows(name, empty, empty, empty, empty, sd2_max)
-
-
-def require_positive(argument: str, value: float, unit: str) -> None:
-    """Raises ArgumentError unless ``value`` is a finite number > 0."""
-    if not (np.isfinite(value) and value > 0):
-        raise ArgumentError(argument, value, f"a finite value > 0 {unit}")
 
 
 def require_robot(name: str, robot: Platform | None) -> Platform:

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.limits.forces import Affine, contact_arms, contact_loads, ground_wrench, specific_force
-from trajopt.limits.limit import Rows, linear_rows, require_positive, require_robot
+from trajopt.limits.limit import Rows, linear_rows, require_robot
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import STANDARD_GRAVITY, Body, Platform
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def _columns(value: Affine, which: slice) -> Affine:
     return Affine(value.a[:, which], value.b[:, which], value.c[:, which])
 
 
-def _distribution(body: Body, driven: NDArray[np.bool_], plain: NDArray[np.bool_]) -> Array:
+def _distribution(body: Body, driven: BoolArray, plain: BoolArray) -> Array:
     """(F, 3): least-norm contact forces from the wrench; one column of force a roller, two a plain
     tyre."""
     arms, columns = contact_arms(body), []

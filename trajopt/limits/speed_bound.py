@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
-
-Array = NDArray[np.float64]
 
 _TOUCH = 1e-9  # m; a zone reaches this far beyond its ends, so that the gridpoint on its edge belongs to it
 

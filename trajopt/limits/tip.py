@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, require_not_negative
 from trajopt.errors import ArgumentError
 from trajopt.limits.forces import contact_arms, specific_force
 from trajopt.limits.limit import Rows, linear_rows, require_robot
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import STANDARD_GRAVITY, Body, Platform
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -32,8 +30,7 @@ class Tip:
     name: str = "tip"
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.reserve) and self.reserve >= 0):
-            raise ArgumentError(f"{self.name}.reserve", self.reserve, "a length >= 0 m")
+        require_not_negative(f"{self.name}.reserve", self.reserve, "m")
 
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
         body = require_robot(self.name, robot).body

@@ -6,10 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from trajopt.arrays import Array, IndexArray
 
 
 class Capability(Enum):
@@ -114,5 +111,5 @@ class AffinePart:
     matrix: Array  # (c, k)
     offset: Array  # (c,)
     period: float
-    variables: NDArray[np.intp]  # (k,) positions in the decision vector
+    variables: IndexArray  # (k,) positions in the decision vector
     base: Array  # (d,)

@@ -14,15 +14,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
 from trajopt.objectives.rollout import step_grid
 from trajopt.objectives.terminal import TerminalObjective
 from trajopt.paths.path import Path
 from trajopt.world.free_ground import FreeGround, path_margin
-
-Array = NDArray[np.float64]
 
 SEARCH_STEPS = 36  # steps along the path in a search, chosen: 6 cm on a 2 m path
 RESERVE = (

@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
-
-Array = NDArray[np.float64]
 
 S3, S5, S7, S9 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880  # Taylor coefficients of the sine
 C2, C4, C6, C8, C10 = -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800  # and of the cosine

@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold
 from trajopt.errors import InfeasibleError
 from trajopt.objectives.base import AffinePart, Capability, Evaluation
-from trajopt.objectives.terminal import TerminalObjective, folded
+from trajopt.objectives.terminal import TerminalObjective
 from trajopt.paths.path import Path
 from trajopt.timing.scaling import time_scale
-
-Array = NDArray[np.float64]
 
 SEARCH_GRIDPOINTS = 60  # of the time scaling inside a search; the score uses the full grid. Chosen
 
@@ -69,7 +67,7 @@ class DurationObjective:
     def _violation(self, candidates: Array) -> Array:
         section = self.terminal.problem.objective
         errors = self.terminal.wheel_errors(self.terminal.predict(candidates.T))
-        worst = np.max([np.abs(folded(np.asarray(e)[0], section.period)) for e in errors], axis=0)
+        worst = np.max([np.abs(fold(np.asarray(e)[0], section.period)) for e in errors], axis=0)
         return np.asarray(np.maximum(worst - section.wheel_tolerance, 0.0))
 
     def evaluate(self, candidates: Array) -> Evaluation:

@@ -12,13 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IndexArray
 from trajopt.objectives.rollout import Kinematics, Terminal
 from trajopt.paths.spline import SplineBasis
 from trajopt.robots.actuator import Actuator
-
-Array = NDArray[np.float64]
 
 _NODES = 6
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(_NODES)
@@ -134,7 +132,7 @@ def _with_crossings(
 
 def _locate(
     wheel_speeds: Callable[[Array], Array],
-    wheel: NDArray[np.intp],
+    wheel: IndexArray,
     level: Array,
     low: Array,
     high: Array,

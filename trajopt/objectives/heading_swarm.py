@@ -16,14 +16,12 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IntArray
 from trajopt.objectives.compiled import MAX_INCREMENT, STRICT
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
 from trajopt.objectives.swarm import LANES, Goal, step_travel, terminal_costs, turned
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
-
-Array = NDArray[np.float64]
 
 # Rows of a block's state, each LANES long: what a candidate gives, the rotations, sums, and last
 # wheel rates.
@@ -193,7 +191,7 @@ class HeadingSwarm:
     first: Array  # (6,)
     inverse: Array
     forward: Array
-    places: NDArray[np.int64]
+    places: IntArray
     fixed: Array
     limits: Array
     start: Array  # (7,)
@@ -253,7 +251,7 @@ def prepared(
     y: Array,
     yaw: Array,
     duration: float,
-    places: NDArray[np.int64],
+    places: IntArray,
 ) -> HeadingSwarm:
     """Rows for control values ``x``, ``y``, ``yaw`` (4,), of which P1, P2 and their headings may be
     replaced.

@@ -18,13 +18,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.spline import SplineBasis
 from trajopt.robots.actuator import Actuator
-
-Array = NDArray[np.float64]
 
 _GAUSS_X, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(
     3

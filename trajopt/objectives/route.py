@@ -15,8 +15,8 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
@@ -27,8 +27,6 @@ from trajopt.robots.platform import Platform
 from trajopt.timing.compiled import fastest_profiles
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import assemble
-
-Array = NDArray[np.float64]
 
 SEARCH_STEPS = 160  # steps along the route for obstacles and walls, chosen: 8 cm on 12 m
 FINE_STEPS = 1600  # the same when a route is judged

@@ -14,13 +14,11 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IntArray
 from trajopt.objectives.compiled import C2, C4, C6, C8, C10, S3, S5, S7, S9, STRICT
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
-
-Array = NDArray[np.float64]
 
 LANES = (
     4  # candidates a block: one vector of doubles (AVX2); 8 and 16 measured slower, registers spill
@@ -169,7 +167,7 @@ class PrescribedSwarm:
     coefficients: Array  # (steps, 34)
     inverse: Array
     forward: Array
-    places: NDArray[np.int64]
+    places: IntArray
     fixed: Array
     limits: Array
     start: Array  # (7,)
@@ -218,7 +216,7 @@ def prepared(
     y: Array,
     yaw: Array,
     duration: float,
-    places: NDArray[np.int64],
+    places: IntArray,
 ) -> PrescribedSwarm:
     """Coefficients for control values ``x``, ``y``, ``yaw`` (4,), of which P1 and P2 may be
     replaced.

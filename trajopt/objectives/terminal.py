@@ -14,8 +14,8 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
 from trajopt.objectives.exact import exact_terminal
@@ -26,8 +26,6 @@ from trajopt.problem.search import Problem
 from trajopt.robots.actuator import Actuator
 from trajopt.robots.catalogue import robot_named
 from trajopt.robots.platform import Platform
-
-Array = NDArray[np.float64]
 
 SEARCH_STEPS = 252  # 84 steps a spline segment, 14 to 20 ms on the problems at hand; chosen
 COARSE_STEPS = 84  # steps for Newton steps, chosen
@@ -244,7 +242,7 @@ class TerminalObjective:
             )
         }
         for name, error in zip(self.problem.goal.critical, self.wheel_errors(final), strict=True):
-            terms[f"wheel {name}"] = section.wheel_gain * np.abs(folded(error, section.period))
+            terms[f"wheel {name}"] = section.wheel_gain * np.abs(fold(error, section.period))
         return terms
 
     @cached_property
@@ -294,7 +292,7 @@ class TerminalObjective:
             matrix, offset = self._affine_errors
             section = self.problem.objective
             cost = section.wheel_gain * np.abs(
-                folded(candidates @ matrix.T + offset, section.period)
+                fold(candidates @ matrix.T + offset, section.period)
             ).sum(axis=1)
             return Evaluation(cost, np.zeros(len(candidates)))
         if self._prescribed is not None and self._prescribed[0].fits(candidates):
@@ -394,7 +392,7 @@ class TerminalObjective:
     def gradient(self, candidate: Array) -> Array:
         """(d,): gradient of the cost where affine (a subgradient at its kinks)."""
         matrix, offset = self.affine()
-        deviation = folded(matrix @ candidate + offset, self.problem.objective.period)
+        deviation = fold(matrix @ candidate + offset, self.problem.objective.period)
         return np.asarray(self.problem.objective.wheel_gain * np.sign(deviation) @ matrix)
 
     def coarse(self) -> TerminalObjective:
@@ -445,11 +443,6 @@ def swarm_engine() -> str:
     return "numba" if importlib.util.find_spec("numba") else "numpy"
 
 
-def folded(angle: Any, period: float) -> Any:
-    """Angle modulo ``period``, folded to [-period/2, period/2): the nearest way round."""
-    return angle - period * np.floor(angle / period + 0.5)
-
-
 def terminal_cost(
     pose_deviation: Array,
     wheel_deviation: Array,
@@ -460,7 +453,7 @@ def terminal_cost(
     """Table 4.4 from deviations alone: pose (3,), wheels (4,), with gains (3,) and (4,)."""
     return float(
         np.dot(pose_gains, np.abs(pose_deviation))
-        + np.dot(wheel_gains, np.abs(folded(np.asarray(wheel_deviation), period)))
+        + np.dot(wheel_gains, np.abs(fold(np.asarray(wheel_deviation), period)))
     )
 
 

@@ -18,12 +18,11 @@ from typing import ClassVar, Literal, NoReturn, Protocol
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from trajopt.errors import ArgumentError, as_numbers
+from trajopt.arrays import Array, BoolArray, IntArray, as_numbers
+from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective
-
-Array = NDArray[np.float64]
 
 FEASIBLE = 1e-9  # violation up to which a candidate counts as feasible (rounding), chosen
 DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, thesis 000 Table 5.8
@@ -85,7 +84,7 @@ class History:
     ``samples`` (m, d) are explored candidates in the order of evaluation (the first 50,000).
     """
 
-    evaluations: NDArray[np.int64]
+    evaluations: IntArray
     seconds: Array
     cost: Array
     violation: Array
@@ -252,9 +251,7 @@ class Run:
             )
         return Evaluation(cost, violation)
 
-    def _failed(
-        self, cost: Array, violation: Array, bad: NDArray[np.bool_], reason: str
-    ) -> Evaluation:
+    def _failed(self, cost: Array, violation: Array, bad: BoolArray, reason: str) -> Evaluation:
         self.failures += int(bad.sum())
         self.first_failure = self.first_failure or reason
         return Evaluation(np.where(bad, np.inf, cost), np.where(bad, np.inf, violation))

@@ -8,8 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
 from trajopt.optimize.base import (
@@ -22,8 +23,6 @@ from trajopt.optimize.base import (
     checked_bounds,
     checked_x0,
 )
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective, SymbolicProblem
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import (
     Capability,
@@ -40,8 +41,6 @@ from trajopt.optimize.base import (
 )
 from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
 from trajopt.optimize.newton import solve_residuals
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

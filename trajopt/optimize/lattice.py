@@ -14,8 +14,9 @@ from typing import ClassVar, cast
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, LatticeObjective, Objective
 from trajopt.optimize.base import (
@@ -29,8 +30,6 @@ from trajopt.optimize.base import (
     checked_x0,
 )
 from trajopt.optimize.newton import solve_residuals
-
-Array = NDArray[np.float64]
 
 EXACT = 1e-9  # cost, or wheel error in rad, up to which a solution counts as exact
 _NO_INFLUENCE = (

@@ -11,12 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.objectives.base import ResidualObjective
 from trajopt.optimize.base import Run
-
-Array = NDArray[np.float64]
 
 DIFFERENCE = 1e-6  # of the box width: step of the central differences for the Jacobian
 SOLVED = 1e-11  # largest weighted residual that counts as solved

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, BoolArray
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.optimize.base import FEASIBLE, checked_bounds
 
-Array = NDArray[np.float64]
 Terms = Callable[[Array], tuple[Array, Array]]
 
 POPULATION = 200  # chosen
@@ -64,7 +64,7 @@ def pareto_front(
     return ParetoFront(found[best], values[best], population * generations)
 
 
-def nondominated(values: Array) -> NDArray[np.bool_]:
+def nondominated(values: Array) -> BoolArray:
     """(n,): which rows of ``values`` (n, m) no other row beats (at least as large in all, larger in
     one)."""
     keep = np.ones(len(values), dtype=bool)

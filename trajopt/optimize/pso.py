@@ -23,7 +23,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Objective
@@ -37,8 +37,6 @@ from trajopt.optimize.base import (
     checked_x0,
 )
 from trajopt.optimize.swarm import Swarm, SwarmRules
-
-Array = NDArray[np.float64]
 
 Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen

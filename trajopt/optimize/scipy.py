@@ -9,8 +9,9 @@ from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective, ResidualObjective
 from trajopt.optimize.base import (
@@ -23,8 +24,6 @@ from trajopt.optimize.base import (
     checked_bounds,
     checked_x0,
 )
-
-Array = NDArray[np.float64]
 
 _LARGE = 1e100  # stands for an infeasible evaluation, since line searches cannot work with inf
 

@@ -16,12 +16,11 @@ from zipfile import BadZipFile
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import FEASIBLE, best_index, better
-
-Array = NDArray[np.float64]
 
 _COLLAPSED = 1e-15  # of the width: spread and velocity at which a swarm has come to rest
 _ARRAYS = ("bounds", "x", "v", "own", "own_cost", "own_violation")
@@ -217,7 +216,7 @@ class Swarm:
     # -- one iteration
     # --------------------------------------------------------------------------------
 
-    def _seen(self) -> NDArray[np.bool_]:
+    def _seen(self) -> BoolArray:
         low, high = self.bounds.T
         return np.asarray(((self.x >= low) & (self.x <= high)).all(axis=1))
 
@@ -255,7 +254,7 @@ class Swarm:
             self.own[rows] = self.x[rows]
             self.own_cost[rows] = cost[rows]
 
-    def _ring_leaders(self) -> NDArray[np.intp]:
+    def _ring_leaders(self) -> IndexArray:
         """(n,): the best own position among each particle's neighbours and itself."""
         feasible = self.own_violation <= FEASIBLE
         order = np.lexsort((self.own_cost, np.where(feasible, 0.0, self.own_violation)))
@@ -320,8 +319,8 @@ def _bring_back(
     v: Array,
     low: Array,
     high: Array,
-    rows: NDArray[np.intp],
-    columns: NDArray[np.intp],
+    rows: IndexArray,
+    columns: IndexArray,
     rng: Generator,
 ) -> None:
     """Apply a boundary rule to the coordinates outside, x[rows, columns], in place."""

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.spline import SplineBasis, chord_length_knots
-
-Array = NDArray[np.float64]
 
 _STANDSTILL_SAMPLES = 9  # a segment, before roots are looked for; chosen
 _CELLS_PER_SEGMENT = (

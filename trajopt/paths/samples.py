@@ -15,12 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import InfeasibleError
 from trajopt.paths.path import Path
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

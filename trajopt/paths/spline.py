@@ -13,11 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,16 +15,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.optimize.ipopt import numpy_on_symbols, smooth_table, solve_program, stacked, variables
 from trajopt.paths.samples import sample_path
 from trajopt.timing.stages import Stages, assemble
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 TABLE_POINTS = 1200  # gridpoints of the rows' tables over s; chosen
 _REACH = 2  # cells that a cubic B-spline mixes on either side: where rows jump, a table takes the strictest of them
@@ -103,8 +102,7 @@ def limit_jerk(
     (a trajectory that does not start and end at rest among them), InfeasibleError when IPOPT finds
     no motion or the slow-down is too large.
     """
-    if not (np.isfinite(jerk) and jerk > 0):
-        raise ArgumentError("jerk", jerk, "a finite value > 0 m/s^3")
+    require_positive("jerk", jerk, "m/s^3")
     if nodes < 10:
         raise ArgumentError("nodes", nodes, "10 or more nodes")
     if trajectory.sd[0] > 1e-9 or trajectory.sd[-1] > 1e-9:
@@ -149,7 +147,7 @@ def limit_jerk(
     )
 
 
-def _near(source: Trajectory) -> NDArray[np.bool_]:
+def _near(source: Trajectory) -> BoolArray:
     """(R,): which rows the time-optimal motion comes near to."""
     rows = _rows(source, source.limits, source.s)
     sdd = np.append(source.sdd, source.sdd[-1])
@@ -178,7 +176,7 @@ def _solve(
     source: Trajectory,
     jerk: float,
     shares: Array,
-    put_in: NDArray[np.bool_],
+    put_in: BoolArray,
     start: Array,
     tolerance: float,
     strict: bool,
@@ -310,7 +308,7 @@ def _margins(rows: Stages, v: Array, a: Array) -> dict[str, float]:
     return found
 
 
-def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, NDArray[np.bool_]]:
+def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, BoolArray]:
     """Slowed uniformly until every row holds on the fine grid (rest is feasible, so a factor
     exists); how far each interval (N,) was broken before; which rows (R,) were."""
     s, v, a, _ = motion.along(_between(motion.times))

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.limits.limit import Limit
 from trajopt.optimize.ipopt import (
@@ -35,7 +36,6 @@ from trajopt.timing.stages import assemble
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.terrain import Terrain
 
-Array = NDArray[np.float64]
 Builder = Callable[[Array], Path]
 
 GRID_CELLS = (

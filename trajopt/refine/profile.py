@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.limits.speed_bound import SpeedProfile
@@ -24,8 +24,6 @@ from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import check, fine_rows, stages_of
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.terrain import Flat, Terrain
-
-Array = NDArray[np.float64]
 
 _CELLS = 400  # intervals of the least-squares program; chosen
 _TIGHTER = 1e-6  # share by which its rows are tightened, for the solver's own tolerance

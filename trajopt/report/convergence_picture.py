@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, BoolArray
 from trajopt.optimize.base import FEASIBLE, Status
 from trajopt.pipeline import Solution
 from trajopt.report.style import BLUE, GREY, ORANGE, VERMILION, new_figure
-
-Array = NDArray[np.float64]
 
 _DECADES = 1.0  # an axis is logarithmic where its values span more decades than this, chosen
 _FLOOR = 1e-16  # smallest cost drawn on a logarithmic axis: rounding of doubles
@@ -72,7 +70,7 @@ def _final(solution: Solution) -> str:
 
 
 def _curve(
-    axes: Axes, solution: Solution, values: Array, feasible: NDArray[np.bool_], final: float
+    axes: Axes, solution: Solution, values: Array, feasible: BoolArray, final: float
 ) -> Array:
     """Staircase of the best so far, dashed while infeasible, and the recomputed final value; what
     was drawn."""

@@ -8,13 +8,11 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon, Rectangle
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold
 from trajopt.problem.search import WHEELS, Problem
 from trajopt.report.style import BLACK, GREY, LIGHT
 from trajopt.robots.platform import Platform
-
-Array = NDArray[np.float64]
 
 _NOSE = 0.22  # share of the robot's length that the mark of its front takes, chosen
 _SLAB = 0.06  # m, drawn depth of the obstacle, chosen
@@ -111,7 +109,7 @@ def obstacle_strip(problem: Problem, robot: Platform, width: float) -> tuple[Arr
     if problem.scene.motion == "lateral":
         left = sum(1 if "left" in WHEELS[i] else -1 for i in problem.goal.critical_indices)
         meets = goal[2] + (np.pi / 2 if left >= 0 else -np.pi / 2)
-    turned = (meets - start[2] + np.pi) % (2 * np.pi) - np.pi
+    turned = fold(meets - start[2])
     yaw = float(start[2] if abs(turned) <= _SQUARE else meets)
     ahead, along = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
     reach = float(np.max((outline(robot, goal) - goal[:2]) @ ahead))

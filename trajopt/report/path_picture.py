@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.pipeline import Solution
 from trajopt.report.ground_plan import (
     draw_obstacle,
@@ -31,8 +31,6 @@ from trajopt.report.style import (
     new_figure,
 )
 from trajopt.robots.catalogue import robot_named
-
-Array = NDArray[np.float64]
 
 _MOMENTS = 6  # robot outlines between start and goal, chosen
 _MOST_DOTS = 20_000  # explored candidates that are drawn, chosen

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.pipeline import Solution
@@ -29,8 +28,6 @@ from trajopt.robots.catalogue import robot_named
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
-
-Array = NDArray[np.float64]
 
 
 def physics_figure(solution: Solution, report: ValidationReport) -> Figure:

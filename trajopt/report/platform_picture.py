@@ -7,15 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.report.style import BLACK, BLUE, GREY, LIGHT, ORANGE, VERMILION, new_figure
 from trajopt.robots.mobility import mobility_of, rotation_centre
 from trajopt.robots.platform import Platform
 from trajopt.robots.wheel import Wheel, WheelKind
-
-Array = NDArray[np.float64]
 
 _WIDTH_SHARE = 0.35  # drawn wheel width over diameter, chosen
 _NEAREST_INFINITY = (

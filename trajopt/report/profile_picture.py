@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.paths.samples import sample_at
 from trajopt.pipeline import MARGIN, Solution
 from trajopt.report.run_folder import binding_shares, wheel_names
@@ -28,8 +28,6 @@ from trajopt.report.style import (
     new_figure,
 )
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _SAMPLES = 1200  # times at which curves are drawn, chosen: more than pixels across
 _INSIDE = (

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.duration import DurationObjective
 from trajopt.objectives.terminal import TerminalObjective, swarm_engine, terminal_objective
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from trajopt.simulate.check import ValidationReport
 
-Array = NDArray[np.float64]
 
 FORMAT = 1  # of the folder; a reader of another number refuses
 SAMPLE_TIME = 0.01  # s, largest step of trajectory.csv; chosen: 100 rows a second

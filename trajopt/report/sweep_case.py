@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.report.files import made_folder, write_json
 from trajopt.report.pictures import save_physics_picture, save_pictures
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 _SAME = 1e-9  # relative; a case solved again must cost what its row says, on any processor. chosen
 _MOST_ARRAYS, _MOST_LINES = 8, 8  # panels of arrays.png and lines in one of them; chosen
-
-Array = NDArray[np.float64]
 
 
 def report_case(

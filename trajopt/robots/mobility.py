@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.robots.platform import Platform
 from trajopt.robots.wheel import Row, Wheel, WheelKind
-
-Array = NDArray[np.float64]
 
 _RANK = 1e-9  # singular values below this share of the largest count as zero
 _TURNS = (WheelKind.STEERED, WheelKind.CASTOR)

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.robots.wheel import Wheel, WheelKind, fixed_wheel, swedish_wheel
-
-Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.control.approach import Mode, approach_controller
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.problem.search import Problem
@@ -16,8 +16,6 @@ from trajopt.simulate.scene import Scene
 from trajopt.systems.smdw.approach_run import SETTLE, steered
 from trajopt.systems.smdw.loc8_model import loc8_mecanum
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 SAMPLE_TIME = 0.002  # s between wheel speed commands: the engines' own step
 COAST = 0.5  # s after the last command in which the robot comes to rest; chosen

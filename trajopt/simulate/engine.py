@@ -15,14 +15,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IntArray
 from trajopt.errors import ArgumentError
 from trajopt.robots.platform import Body, Platform
 from trajopt.robots.wheel import swedish_wheel
 from trajopt.simulate.rollers import RollerWheel, Vector
 from trajopt.simulate.scene import Scene, require
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 GRAVITY = 9.81  # m/s^2, standard gravity, rounded
 ENGINES = ("pybullet", "mujoco")
 
@@ -74,7 +73,7 @@ class SimRobot:
         unit = self.chassis_mass / 12.0
         return (unit * (y * y + z * z), unit * (x * x + z * z), unit * (x * x + y * y))
 
-    def wheel_centres(self) -> FloatArray:
+    def wheel_centres(self) -> Array:
         """Wheel centres (4, 3) in the robot frame [m]."""
         return np.array(
             [(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)]
@@ -120,9 +119,9 @@ class SimRobot:
             self.name, wheels, body, ((ex, ey), (-ex, ey), (-ex, -ey), (ex, -ey)), holonomic=True
         )
 
-    def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> FloatArray:
+    def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> Array:
         """Wheel speeds (4,) [rad/s] that roll without slip at body speeds (m/s, m/s, rad/s)."""
-        speeds: FloatArray = self.platform.inverse @ np.array([vx, vy, yaw_rate])
+        speeds: Array = self.platform.inverse @ np.array([vx, vy, yaw_rate])
         return speeds
 
 
@@ -134,8 +133,8 @@ class Command:
     [m, m, rad]; ``start_wheel_angles`` (4,) [rad].
     """
 
-    times: FloatArray
-    wheel_speeds: FloatArray
+    times: Array
+    wheel_speeds: Array
     start_pose: Vector = (0.0, 0.0, 0.0)
     start_wheel_angles: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
@@ -161,7 +160,7 @@ class Command:
         """Last time [s]."""
         return float(self.times[-1])
 
-    def at(self, moment: float) -> FloatArray:
+    def at(self, moment: float) -> Array:
         """Wheel speeds (4,) at ``moment`` [s]."""
         if moment < 0.0 or moment > self.times[-1]:
             return np.zeros(4)
@@ -170,7 +169,7 @@ class Command:
         )
         before, after = self.times[right - 1], self.times[right]
         part = (moment - before) / (after - before)
-        speeds: FloatArray = (1.0 - part) * self.wheel_speeds[right - 1] + part * self.wheel_speeds[
+        speeds: Array = (1.0 - part) * self.wheel_speeds[right - 1] + part * self.wheel_speeds[
             right
         ]
         return speeds
@@ -201,12 +200,12 @@ class Observation:
     ``contacts`` with the terrain, ``penetration`` [m] of the deepest one (positive is inside).
     """
 
-    position: FloatArray
-    rotation: FloatArray
-    velocity: FloatArray
-    wheel_angles: FloatArray
-    wheel_speeds: FloatArray
-    wheel_torques: FloatArray
+    position: Array
+    rotation: Array
+    velocity: Array
+    wheel_angles: Array
+    wheel_speeds: Array
+    wheel_torques: Array
     contacts: int
     penetration: float
 
@@ -225,15 +224,15 @@ class Recording:
 
     engine: str
     version: str
-    times: FloatArray
-    pose: FloatArray
-    height: FloatArray
-    roll: FloatArray
-    pitch: FloatArray
-    wheel_angles: FloatArray
-    wheel_speeds: FloatArray
-    wheel_torques: FloatArray
-    wheel_heights: FloatArray
+    times: Array
+    pose: Array
+    height: Array
+    roll: Array
+    pitch: Array
+    wheel_angles: Array
+    wheel_speeds: Array
+    wheel_torques: Array
+    wheel_heights: Array
     contacts: IntArray
     exploded: bool
     reason: str
@@ -242,7 +241,7 @@ class Recording:
     picture: NDArray[np.uint8] | None = None
 
 
-Controller = Callable[[float, Observation], FloatArray]
+Controller = Callable[[float, Observation], Array]
 
 
 class Engine(Protocol):
@@ -270,7 +269,7 @@ class Engine(Protocol):
 class Session(Protocol):
     """One running simulation, as ``drive`` steps it."""
 
-    def advance(self, wheel_speeds: FloatArray) -> None:
+    def advance(self, wheel_speeds: Array) -> None:
         """One time step with these wheel speed targets (4,) [rad/s]."""
         ...
 

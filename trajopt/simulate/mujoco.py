@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IndexArray, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.simulate.engine import (
     Camera,
     Command,
     Controller,
-    FloatArray,
     Observation,
     Recording,
     SimRobot,
@@ -105,11 +105,11 @@ class _MuJoCoSession:
     mujoco: Any
     model: Any
     data: Any
-    wheel_positions: NDArray[np.intp]
-    wheel_velocities: NDArray[np.intp]
-    angle_offset: FloatArray
+    wheel_positions: IndexArray
+    wheel_velocities: IndexArray
+    angle_offset: Array
 
-    def advance(self, wheel_speeds: FloatArray) -> None:
+    def advance(self, wheel_speeds: Array) -> None:
         """One time step with these wheel speed targets (4,) [rad/s]."""
         self.data.ctrl[:] = wheel_speeds
         self.mujoco.mj_step(self.model, self.data)
@@ -165,7 +165,7 @@ def _session(mujoco: Any, model: Any, command: Command) -> _MuJoCoSession:
     velocities = np.array([model.jnt_dofadr[joint] for joint in joints], dtype=np.intp)
     start = np.array(command.start_wheel_angles, dtype=np.float64)
     # small angles keep their digits: whole turns are added when reading
-    folded = np.remainder(start + math.pi, 2.0 * math.pi) - math.pi
+    folded = fold(start)
     data.qpos[:7] = (x, y, 0.0, math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0))
     data.qpos[positions] = folded
     mujoco.mj_forward(model, data)

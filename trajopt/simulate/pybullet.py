@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.simulate.engine import (
     GRAVITY,
     Camera,
     Command,
     Controller,
-    FloatArray,
     Observation,
     Recording,
     SimRobot,
@@ -155,10 +155,10 @@ class _BulletSession:
     wheel_joints: tuple[int, ...]
     torque: float
     gain: float
-    cog: FloatArray
-    angle_offset: FloatArray
+    cog: Array
+    angle_offset: Array
 
-    def advance(self, wheel_speeds: FloatArray) -> None:
+    def advance(self, wheel_speeds: Array) -> None:
         """One time step with these wheel speed targets (4,) [rad/s]."""
         self.bullet.setJointMotorControlArray(
             self.body,
@@ -274,7 +274,7 @@ def _session(
     )
     wheels = tuple(names.index(f"wheel_{index}") for index in range(4))
     start = np.array(command.start_wheel_angles, dtype=np.float64)
-    folded = np.remainder(start + math.pi, 2.0 * math.pi) - math.pi
+    folded = fold(start)
     for joint, angle in zip(wheels, folded, strict=True):
         bullet.resetJointState(body, joint, float(angle), 0.0, physicsClientId=client)
     cog = np.array([0.0, 0.0, robot.cog_height])

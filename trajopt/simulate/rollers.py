@@ -20,13 +20,12 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 
-FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]
-Support = Callable[[FloatArray], FloatArray]
+Support = Callable[[Array], Array]
 Shape = Literal["spheres", "barrel", "ellipsoid", "cylinder", "cone"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 
@@ -113,18 +112,18 @@ class RollerWheel:
         return self.hub_mass + len(self.rollers) * self.roller_mass
 
 
-def normals(phi: FloatArray) -> FloatArray:
+def normals(phi: Array) -> Array:
     """Outward rim normals ``m(phi)``, shape ``(..., 3)``."""
     return np.stack([-np.sin(phi), np.zeros_like(phi), -np.cos(phi)], axis=-1)
 
 
-def tangents(phi: FloatArray) -> FloatArray:
+def tangents(phi: Array) -> Array:
     """Rim tangents, the forward direction of the hub frame turned to ``phi``, shape ``(...,
     3)``."""
     return np.stack([np.cos(phi), np.zeros_like(phi), -np.sin(phi)], axis=-1)
 
 
-def inscribed(points: FloatArray, support: Support) -> tuple[FloatArray, FloatArray]:
+def inscribed(points: Array, support: Support) -> tuple[Array, Array]:
     """Largest spheres at ``points`` (K, 3) inside the outline: radii (K,) and normal angles touched
     (K,).
 
@@ -142,18 +141,18 @@ def inscribed(points: FloatArray, support: Support) -> tuple[FloatArray, FloatAr
     right = gaps[rows, (nearest + 1) % ENVELOPE_SAMPLES]
     bend = np.maximum(left - 2.0 * here + right, 1e-300)
     shift = np.clip(0.5 * (left - right) / bend, -0.5, 0.5)
-    radii: FloatArray = here - 0.25 * (left - right) * shift
-    touched: FloatArray = phi[nearest] + shift * (2.0 * math.pi / ENVELOPE_SAMPLES)
+    radii: Array = here - 0.25 * (left - right) * shift
+    touched: Array = phi[nearest] + shift * (2.0 * math.pi / ENVELOPE_SAMPLES)
     return radii, touched
 
 
-def outline_point(phi: float, support: Support) -> FloatArray:
+def outline_point(phi: float, support: Support) -> Array:
     """Point (3,) of the outline whose outward normal has the angle ``phi``: ``h m + h' m'``."""
     step = 1e-5  # rad; the error of the central difference is about h * step^2 = 1e-11 m
     around = support(np.array([phi - step, phi, phi + step]))
     slope = (around[2] - around[0]) / (2.0 * step)
     at = np.array(phi)
-    point: FloatArray = around[1] * normals(at) - slope * tangents(at)
+    point: Array = around[1] * normals(at) - slope * tangents(at)
     return point
 
 
@@ -207,7 +206,7 @@ def place_roller(
     return Roller(_vector(centre + np.array([0.0, seat.offset, 0.0])), _vector(axis), profile)
 
 
-def _aims(seat: Seat, spheres: int) -> FloatArray:
+def _aims(seat: Seat, spheres: int) -> Array:
     """Normal angles that stations must touch: sector end, one a sphere at even spacing, sector
     end."""
     low, high = seat.sector
@@ -215,9 +214,7 @@ def _aims(seat: Seat, spheres: int) -> FloatArray:
     return np.concatenate([[high], inner, [low]])
 
 
-def _stations_for(
-    aims: FloatArray, centre: FloatArray, axis: FloatArray, seat: Seat, support: Support
-) -> FloatArray:
+def _stations_for(aims: Array, centre: Array, axis: Array, seat: Seat, support: Support) -> Array:
     """Stations [m] on the roller axis whose inscribed spheres touch the outline at normal angles
     ``aims``."""
     grid = np.linspace(-AXIS_REACH, AXIS_REACH, AXIS_SAMPLES)
@@ -237,13 +234,11 @@ def _stations_for(
         raise ArgumentError(
             "rollers", seat.sector, "more rollers: one straight roller cannot serve this sector"
         )
-    stations: FloatArray = np.interp(aims, angles[::-1], grid[low:high][::-1])
+    stations: Array = np.interp(aims, angles[::-1], grid[low:high][::-1])
     return stations
 
 
-def _barrel(
-    centre: FloatArray, axis: FloatArray, support: Support, ends: tuple[float, float]
-) -> Revolved:
+def _barrel(centre: Array, axis: Array, support: Support, ends: tuple[float, float]) -> Revolved:
     """Canal surface of the inscribed spheres, touched at ``s - r r'`` with radius ``r sqrt(1 -
     r'^2)``."""
     step = 2e-4  # m; long enough to keep the noise of the minimum out of the derivative
@@ -256,7 +251,7 @@ def _barrel(
     return Revolved(_floats(span - here * slope), _floats(here * np.sqrt(1.0 - slope**2)))
 
 
-def _ellipsoid(centre: FloatArray, axis: FloatArray, seat: Seat, support: Support) -> Ellipsoid:
+def _ellipsoid(centre: Array, axis: Array, seat: Seat, support: Support) -> Ellipsoid:
     """Longest ellipsoid of revolution that touches the outline at ``seat.phi`` and stays inside it.
 
     Its support function is c . m + sqrt(r^2 + (l^2 - r^2) (a . m)^2) <= h for every normal m. On a
@@ -271,11 +266,11 @@ def _ellipsoid(centre: FloatArray, axis: FloatArray, seat: Seat, support: Suppor
     return Ellipsoid(seat.radius, math.sqrt(max(float(np.min(bounds)), seat.radius**2)))
 
 
-def _floats(values: FloatArray) -> tuple[float, ...]:
+def _floats(values: Array) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
 
 
-def _vector(values: FloatArray) -> Vector:
+def _vector(values: Array) -> Vector:
     return (float(values[0]), float(values[1]), float(values[2]))
 
 
@@ -303,7 +298,7 @@ def mecanum_wheel(
             "rollers", rollers, "at least 3 rollers a wheel (12 or more roll smoothly)"
         )
 
-    def circle(phi: FloatArray) -> FloatArray:
+    def circle(phi: Array) -> Array:
         return np.full_like(phi, radius)
 
     pitch = 2.0 * math.pi / rollers
@@ -367,7 +362,7 @@ def _extent_along_axle(roller: Roller) -> tuple[float, float]:
     return roller.centre[1] + low, roller.centre[1] + high
 
 
-def support_height(wheel: RollerWheel, phi: FloatArray) -> FloatArray:
+def support_height(wheel: RollerWheel, phi: Array) -> Array:
     """Distance [m] from the axle down to the lowest point of the rollers when the place ``phi`` is
     down.
 
@@ -389,7 +384,7 @@ def support_height(wheel: RollerWheel, phi: FloatArray) -> FloatArray:
     return best
 
 
-def revolve(profile: Revolved, *, sides: int = SIDES, shrink: float = 0.0) -> FloatArray:
+def revolve(profile: Revolved, *, sides: int = SIDES, shrink: float = 0.0) -> Array:
     """Vertices (V, 3) of the solid of revolution about z; ``shrink`` [m] is taken off all round.
 
     Engines that add a margin to convex hulls get their nominal surface back by shrinking first.

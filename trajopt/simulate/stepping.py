@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.simulate.engine import (
     Camera,
     Command,
     Controller,
-    FloatArray,
     Observation,
     Recording,
     Session,
@@ -96,7 +96,7 @@ def drive(
 def _assembled(
     robot: SimRobot,
     label: tuple[str, str],
-    times: FloatArray,
+    times: Array,
     rows: list[Observation],
     reason: str,
     clock: tuple[float, float],

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.simulate.engine import FloatArray, SimRobot
+from trajopt.simulate.engine import SimRobot
 from trajopt.simulate.rollers import (
     Revolved,
     Roller,
@@ -134,7 +135,7 @@ def _shapes(roller: Roller, style: _Style) -> list[str]:
     )
 
 
-def _obj(vertices: FloatArray, profile: Revolved) -> str:
+def _obj(vertices: Array, profile: Revolved) -> str:
     """Wavefront OBJ of the rings of ``revolve``: side faces and two lids."""
     rings = len(profile.stations)
     sides = len(vertices) // rings

@@ -15,13 +15,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import AnyArray, Array
 from trajopt.errors import ArgumentError
 from trajopt.sweeps.cases import as_column
 from trajopt.sweeps.expressions import evaluate, parse
 
-Array = NDArray[Any]
 MOST_CASES = 100_000_000  # beyond that the table itself does not fit a machine; chosen
 
 _KINDS = ("values", "range", "log", "random")
@@ -30,10 +29,10 @@ _METHODS = ("random", "latin-hypercube", "sobol")
 
 def combined(
     axes: Mapping[str, Mapping[str, Any]], sample: Mapping[str, Any] | None = None
-) -> dict[str, Array]:
+) -> dict[str, AnyArray]:
     """Columns of all combinations; the last axis varies fastest. Raises ArgumentError for a wrong
     axis."""
-    groups: dict[str, dict[str, Array]] = {}
+    groups: dict[str, dict[str, AnyArray]] = {}
     for name, axis in axes.items():
         group = axis.get("zip")
         groups.setdefault(f"zip {group}" if group is not None else f"axis {name}", {})[name] = (
@@ -50,7 +49,7 @@ def combined(
     total = math.prod(sizes) if sizes else 0
     if total > MOST_CASES:
         raise ArgumentError("axes", total, f"at most {MOST_CASES} cases")
-    result: dict[str, Array] = {}
+    result: dict[str, AnyArray] = {}
     inner = total
     for size, columns in zip(sizes, groups.values(), strict=True):
         inner //= max(size, 1)
@@ -64,7 +63,7 @@ def combined(
     return result
 
 
-def axis_values(name: str, axis: Mapping[str, Any]) -> Array:
+def axis_values(name: str, axis: Mapping[str, Any]) -> AnyArray:
     """Values (n,) of one axis."""
     where = f"axes.{name}"
     given = [kind for kind in _KINDS if kind in axis]
@@ -90,7 +89,7 @@ def axis_values(name: str, axis: Mapping[str, Any]) -> Array:
         raise ArgumentError(where, values, "[from, to, count] with a whole count >= 1")
     low, high, count = values
     if given[0] == "range":
-        evenly: Array = np.linspace(low, high, count)
+        evenly: AnyArray = np.linspace(low, high, count)
         return as_column(where, evenly)
     if not (low > 0 and high > 0):
         raise ArgumentError(where, values, "[from, to, count] with from and to > 0")
@@ -98,8 +97,8 @@ def axis_values(name: str, axis: Mapping[str, Any]) -> Array:
 
 
 def with_derived(
-    columns: dict[str, Array], derived: Mapping[str, str], exclude: Sequence[str]
-) -> dict[str, Array]:
+    columns: dict[str, AnyArray], derived: Mapping[str, str], exclude: Sequence[str]
+) -> dict[str, AnyArray]:
     """Columns with derived values (an expression a name) added and excluded cases (an expression
     each) removed."""
     if not derived and not exclude:
@@ -128,7 +127,7 @@ def with_derived(
     }
 
 
-def _independent(name: str, spec: Mapping[str, Any]) -> Array:
+def _independent(name: str, spec: Mapping[str, Any]) -> AnyArray:
     """Random draws of one axis; the stream depends on the seed and the axis' name."""
     seed, count = spec.get("seed"), spec.get("count")
     if not _whole(seed, 0) or not _whole(count, 1):
@@ -137,12 +136,12 @@ def _independent(name: str, spec: Mapping[str, Any]) -> Array:
         )
     digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
     rng = np.random.default_rng([int(seed), int.from_bytes(digest, "little")])  # type: ignore[arg-type]
-    draws: Array = rng.random((int(count),))  # type: ignore[arg-type]
+    draws: AnyArray = rng.random((int(count),))  # type: ignore[arg-type]
     shape = {k: v for k, v in spec.items() if k not in ("seed", "count")}
     return as_column(name, _quantile(f"axes.{name}.random", shape)(draws))
 
 
-def _joint(sample: Mapping[str, Any]) -> dict[str, Array]:
+def _joint(sample: Mapping[str, Any]) -> dict[str, AnyArray]:
     unknown = set(sample) - {"method", "count", "seed", "axes"}
     method, count, seed, axes = (sample.get(k) for k in ("method", "count", "seed", "axes"))
     if unknown or method not in _METHODS or not _whole(count, 1) or not _whole(seed, 0) or not axes:
@@ -157,7 +156,7 @@ def _joint(sample: Mapping[str, Any]) -> dict[str, Array]:
     }
 
 
-def _unit_draws(method: str, count: int, dimension: int, seed: int) -> NDArray[np.float64]:
+def _unit_draws(method: str, count: int, dimension: int, seed: int) -> Array:
     """(count, dimension) points in the open unit cube."""
     rng = np.random.default_rng(seed)
     if method == "random":
@@ -175,11 +174,11 @@ def _unit_draws(method: str, count: int, dimension: int, seed: int) -> NDArray[n
         if method == "latin-hypercube"
         else sampler.random_base2(max(0, math.ceil(math.log2(count))))[:count]
     )
-    unit: NDArray[np.float64] = np.clip(np.asarray(drawn), 1e-12, 1 - 1e-12)
+    unit: Array = np.clip(np.asarray(drawn), 1e-12, 1 - 1e-12)
     return unit
 
 
-def _quantile(where: str, spec: Mapping[str, Any]) -> Callable[[Array], Array]:
+def _quantile(where: str, spec: Mapping[str, Any]) -> Callable[[AnyArray], AnyArray]:
     """Inverse distribution: uniform = [low, high], log-uniform, normal = [mean, deviation], choice
     = [...]."""
     if len(spec) != 1:

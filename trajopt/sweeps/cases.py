@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from trajopt.arrays import AnyArray, IntArray, require_finite
 from trajopt.errors import ArgumentError
 
 ID_BYTES = 16  # 128 bit: two of 1e9 cases collide with probability 1e-21
@@ -54,13 +54,13 @@ class CaseTable:
     identities as bytes. Equal cases appear once.
     """
 
-    columns: Mapping[str, NDArray[Any]]
+    columns: Mapping[str, AnyArray]
     ids: NDArray[np.bytes_]
 
     def __len__(self) -> int:
         return len(self.ids)
 
-    def take(self, positions: NDArray[np.int64]) -> CaseTable:
+    def take(self, positions: IntArray) -> CaseTable:
         """The cases at ``positions``."""
         return CaseTable(
             {name: column[positions] for name, column in self.columns.items()}, self.ids[positions]
@@ -78,7 +78,7 @@ class CaseTable:
 
 
 def case_table(
-    cases: Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]], base: bytes = b""
+    cases: Iterable[Mapping[str, Any]] | Mapping[str, AnyArray], base: bytes = b""
 ) -> CaseTable:
     """Table of cases, given as mappings with equal keys or as columns; ``base`` comes from
     ``identity_base``.
@@ -125,8 +125,7 @@ def canonical(name: str, value: Any) -> Any:
             raise ArgumentError(name, value, "a whole number of at most 64 bits")
         return value
     if isinstance(value, float):
-        if not math.isfinite(value):
-            raise ArgumentError(name, value, "a finite number")
+        require_finite(name, value)
         return value + 0.0
     if isinstance(value, np.ndarray):
         return canonical(name, value.tolist())
@@ -139,7 +138,7 @@ def canonical(name: str, value: Any) -> Any:
     )
 
 
-def as_column(name: str, values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
+def as_column(name: str, values: Sequence[Any] | AnyArray) -> AnyArray:
     """One column (n,) of canonical values; whole numbers mixed with others become floats."""
     if isinstance(values, np.ndarray) and values.ndim == 1 and values.dtype.kind in "biuf":
         if values.dtype.kind == "f":
@@ -160,7 +159,7 @@ def as_column(name: str, values: Sequence[Any] | NDArray[Any]) -> NDArray[Any]:
     return column
 
 
-def _columns_of(cases: Iterable[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
+def _columns_of(cases: Iterable[Mapping[str, Any]]) -> dict[str, AnyArray]:
     names: list[str] | None = None
     values: dict[str, list[Any]] = {}
     for case in cases:
@@ -178,7 +177,7 @@ def _columns_of(cases: Iterable[Mapping[str, Any]]) -> dict[str, NDArray[Any]]:
     return {name: as_column(name, column) for name, column in values.items()}
 
 
-def _identities(columns: Mapping[str, NDArray[Any]], base: bytes, size: int) -> NDArray[np.bytes_]:
+def _identities(columns: Mapping[str, AnyArray], base: bytes, size: int) -> NDArray[np.bytes_]:
     names = sorted(columns)
     prefix = hashlib.blake2b(base + json.dumps(names).encode(), digest_size=ID_BYTES)
     ids = np.empty(size, dtype=f"S{2 * ID_BYTES}")

@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import IntArray
 from trajopt.errors import TrajoptError
 from trajopt.sweeps.cases import CaseTable
 from trajopt.sweeps.executors import Engine
@@ -49,8 +49,6 @@ MOST_CASES = 10_000  # cases of one chunk, whatever their time; chosen
 _AHEAD = 2  # chunks in flight a worker, so that none waits for the submitter; chosen
 _STOP_GRACE = 20.0  # s that workers get to store what they have after a stop; chosen
 _MOST_REBUILDS = 1_000  # of executors, before something else must be wrong; chosen
-
-Array = NDArray[np.int64]
 
 
 class WorkerStartError(TrajoptError):
@@ -91,7 +89,7 @@ class Progress:
 
 @dataclass
 class _Chunk:
-    places: Array
+    places: IntArray
     deaths: int = 0
 
 
@@ -100,7 +98,7 @@ class Drive:
     """One run over the cases of ``table`` at ``places``. Mutable by nature; lives for one run."""
 
     table: CaseTable
-    places: Array
+    places: IntArray
     setup: Setup
     engine: Engine
     report: Callable[[Progress], None]

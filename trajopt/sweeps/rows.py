@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import AnyArray
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.sweeps.cases import CaseTable
 
@@ -30,7 +30,7 @@ class Row(NamedTuple):
     place: int
     status: str
     results: dict[str, Any]
-    arrays: dict[str, NDArray[Any]]
+    arrays: dict[str, AnyArray]
     error: str = ""
     message: str = ""
     traceback: str = ""
@@ -39,7 +39,7 @@ class Row(NamedTuple):
     attempts: int = 1
 
 
-def results_of(returned: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+def results_of(returned: Any) -> tuple[dict[str, Any], dict[str, AnyArray]]:
     """Table cells and arrays in what a run function returned: a mapping, a number, or None.
 
     Nested mappings become dotted names, enums their names, NumPy arrays of one dimension or more go
@@ -50,13 +50,13 @@ def results_of(returned: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     if not isinstance(returned, Mapping):
         returned = {"value": returned}
     cells: dict[str, Any] = {}
-    arrays: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, AnyArray] = {}
     _flatten("", returned, cells, arrays)
     return cells, arrays
 
 
 def _flatten(
-    prefix: str, values: Mapping[Any, Any], cells: dict[str, Any], arrays: dict[str, NDArray[Any]]
+    prefix: str, values: Mapping[Any, Any], cells: dict[str, Any], arrays: dict[str, AnyArray]
 ) -> None:
     for key, value in values.items():
         if not isinstance(key, str):
@@ -142,7 +142,7 @@ def fitted(rows: Sequence[Row], kinds: Mapping[str, Kind]) -> list[Row]:
     return result
 
 
-def parameter_kind(column: NDArray[Any]) -> Kind:
+def parameter_kind(column: AnyArray) -> Kind:
     """Kind of the table column that holds a column of case values."""
     match column.dtype.kind:
         case "b":

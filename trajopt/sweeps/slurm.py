@@ -23,8 +23,8 @@ from pathlib import Path
 from types import FrameType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import IntArray
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.sweeps.cases import CaseTable
 from trajopt.sweeps.child import THREAD_VARIABLES
@@ -182,7 +182,7 @@ def _sampled_seconds(
 
 def _chunks(
     table: CaseTable,
-    places: NDArray[np.int64],
+    places: IntArray,
     run: RunFunction,
     store: Store,
     limits: CaseLimits,

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import TrajoptError
 from trajopt.sweeps.merging import (
     common_schema,
@@ -150,7 +151,7 @@ class Store:
             for entry in sorted(found, key=lambda e: str(e["values"]))
         }
 
-    def case(self, prefix: str) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+    def case(self, prefix: str) -> tuple[dict[str, Any], dict[str, Array]]:
         """Row and arrays of the one case whose identity starts with ``prefix``. Raises
         StoreError."""
         compute = arrow().compute
@@ -161,7 +162,7 @@ class Store:
                 f"{self.path}: {len(table)} cases start with '{prefix}'; give more digits of one case"
             )
         row = table.to_pylist()[0]
-        arrays: dict[str, NDArray[np.float64]] = {}
+        arrays: dict[str, Array] = {}
         beside = self._union("arrays", None, ("case", "=", row["case"]))
         for entry in beside.to_pylist():
             arrays[entry["name"]] = np.asarray(entry["values"], dtype=np.float64).reshape(

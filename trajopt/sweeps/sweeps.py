@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import trajopt
+from trajopt.arrays import AnyArray, IntArray
 from trajopt.errors import ArgumentError
 from trajopt.sweeps.cases import CaseTable, case_table, identity_base
 from trajopt.sweeps.drive import Drive, Progress, Setup
@@ -35,7 +35,7 @@ _PACKAGES = ("numpy", "scipy", "casadi", "pyarrow", "numba", "mujoco", "pybullet
 
 
 def sweep(
-    cases: CaseTable | Iterable[Mapping[str, Any]] | Mapping[str, NDArray[Any]],
+    cases: CaseTable | Iterable[Mapping[str, Any]] | Mapping[str, AnyArray],
     run: RunFunction,
     *,
     executor: Engine | Executor | Callable[[], Executor] | int | None = None,
@@ -109,7 +109,7 @@ def tabled(cases: Any, run: RunFunction, code: str | None, problem: Any) -> Case
     return table
 
 
-def missing(table: CaseTable, store: Store, *, retry_failed: bool = False) -> NDArray[np.int64]:
+def missing(table: CaseTable, store: Store, *, retry_failed: bool = False) -> IntArray:
     """Positions of cases that have no row in the store (with ``retry_failed``: none that is
     done)."""
     known = store.finished(with_failed=not retry_failed)

@@ -4,13 +4,11 @@ alone."""
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.timing.feasibility import allowed_end, empty_set, require_bounded, require_start_speed
 from trajopt.timing.stages import Stages
-
-Array = NDArray[np.float64]
 
 
 def only_bounds(stages: Stages) -> bool:

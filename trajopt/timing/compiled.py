@@ -5,13 +5,11 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IndexArray
 from trajopt.errors import ArgumentError
 from trajopt.timing.feasibility import allowed_end, empty_set, require_bounded, require_start_speed
 from trajopt.timing.stages import SD2_CAP, Stages
-
-Array = NDArray[np.float64]
 
 
 def is_compiled() -> bool:
@@ -68,7 +66,7 @@ def controllable_sets(stages: Stages, lowest: float, highest: float) -> Array:
 
 def fastest_profiles(
     s: Array, a: Array, b: Array, c: Array, sd2_max: Array, start: Array, end: Array
-) -> tuple[Array, NDArray[np.intp]]:
+) -> tuple[Array, IndexArray]:
     """Fastest profiles of P paths at once, each with G gridpoints and R rows a s'' + b s'^2 <= c.
 
     ``s`` and ``sd2_max`` (P, G), ``a``, ``b``, ``c`` (P, G, R) divided by their scale, ``start``

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import NDArray
-
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.timing.bounds import bounds_profile, only_bounds
 from trajopt.timing.compiled import compiled_profile, is_compiled
 from trajopt.timing.stages import Stages
 from trajopt.timing.toppra import toppra_profile
-
-Array = NDArray[np.float64]
 
 ENGINES: Mapping[str, Callable[[Stages, float, float], Array]] = MappingProxyType(
     {

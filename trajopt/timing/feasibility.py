@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import InfeasibleError
 from trajopt.timing.stages import SD2_CAP, Stages
-
-Array = NDArray[np.float64]
 
 _SAME = 1e-9  # relative difference of s'^2 that counts as equal
 

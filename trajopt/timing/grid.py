@@ -7,12 +7,11 @@ acceleration), so no interval may reach across one.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, BoolArray
 from trajopt.errors import ArgumentError
 from trajopt.paths.path import Path
-
-Array = NDArray[np.float64]
 
 _CELLS = (
     400  # intervals on a path when the caller does not say; chosen: refinement adds what is missing
@@ -68,7 +67,7 @@ def insert(path: Path, u: Array, places: Array) -> Array:
     return np.sort(np.concatenate([u, new]))
 
 
-def split(u: Array, where: NDArray[np.bool_], parts: int) -> Array:
+def split(u: Array, where: BoolArray, parts: int) -> Array:
     """Grid with the intervals ``where`` (N,) cut into ``parts`` equal ones."""
     fractions = np.arange(1, parts) / parts
     new = u[:-1][where, None] + (u[1:] - u[:-1])[where, None] * fractions

@@ -17,11 +17,10 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IndexArray
 from trajopt.timing.stages import SD2_CAP
 
-Array = NDArray[np.float64]
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -292,7 +291,7 @@ def fastest_of_many(
     start: Array,
     end: Array,
     sd2: Array,
-    failed: NDArray[np.intp],
+    failed: IndexArray,
 ) -> None:
     """Both passes for P paths: s, sd2_max, sd2 (P, G), a, b, c (P, G, R), start, end, failed (P,).
 

@@ -4,11 +4,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.paths.path import Path
-
-Array = NDArray[np.float64]
 
 
 def linear_profile(path: Path, u: Array) -> Array:

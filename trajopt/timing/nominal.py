@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from trajopt.errors import ArgumentError
+from trajopt.arrays import require_positive
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.robots.platform import Platform
@@ -16,8 +15,6 @@ from trajopt.timing.grid import initial_grid
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.terrain import Flat, Terrain
-
-Array = NDArray[np.float64]
 
 
 def nominal_timing(
@@ -34,8 +31,7 @@ def nominal_timing(
     The motion neither starts nor ends at rest. Raises ArgumentError for a duration that is not
     positive.
     """
-    if not (np.isfinite(duration) and duration > 0):
-        raise ArgumentError("duration", duration, "a time > 0 s")
+    require_positive("duration", duration, "s")
     u = initial_grid(path, None)
     s = path.parameter(u)
     sd2 = linear_profile(path, u)

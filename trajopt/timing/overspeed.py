@@ -9,13 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.limits.limit import Limit
 from trajopt.limits.yielding import Yielding
 from trajopt.timing.stages import FineRows, Stages, stages_of
-
-Array = NDArray[np.float64]
 
 _KEPT_BACK = (
     1e-3  # share of the possible braking that is not used, for rows between gridpoints; chosen

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
@@ -24,8 +25,6 @@ from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.terrain import Flat, Terrain
-
-Array = NDArray[np.float64]
 
 REFINE_ABOVE = (
     1e-5  # violation of s'^2 between gridpoints, relative, that is refined away if it can; chosen

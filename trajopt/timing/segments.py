@@ -10,12 +10,10 @@ ceiling, and the fastest profile below it that keeps all limits is driven.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.paths.path import Path
 from trajopt.timing.stages import FineRows, check
-
-Array = NDArray[np.float64]
 
 
 def segment_factors(path: Path, fine: FineRows) -> Array:

@@ -7,14 +7,12 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.timing.engines import ENGINES, pick_engine
 from trajopt.timing.stages import Stages, fine_rows, stages_of
 from trajopt.timing.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 
 def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, float]:
@@ -26,8 +24,7 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
     Raises ArgumentError for a trajectory that is not time-optimal (linear, segments), or a change
     that is not > 0.
     """
-    if not (np.isfinite(change) and change > 0):
-        raise ArgumentError("change", change, "a share > 0, as 0.01 for one percent")
+    require_positive("change", change, "(a share, as 0.01 for one percent)")
     if trajectory.engine not in ENGINES:
         raise ArgumentError(
             "trajectory.engine",
@@ -50,7 +47,7 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
     return MappingProxyType(saved)
 
 
-def _duration(stages: Stages, stopped: NDArray[np.bool_], ends: Array) -> float:
+def _duration(stages: Stages, stopped: BoolArray, ends: Array) -> float:
     stages = replace(stages, sd2_max=np.where(stopped, 0.0, stages.sd2_max))
     # A start speed on its limit is above it by rounding; the engine allows for that.
     profile = ENGINES[pick_engine("auto", stages)](stages, float(ends[0]), float(ends[1]))

@@ -12,16 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IndexArray
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples, sample_at
 from trajopt.robots.platform import Platform
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 SD2_CAP = 1e8  # m^2/s^2; stands for "no bound": 10 km/s, far beyond any ground robot
 FINER = 10  # intervals of the fine grid in one of the solver's (DESIGN)
@@ -42,12 +39,12 @@ class Stages:
     c: Array  # (G, R)
     sd2_max: Array  # (G,) m^2/s^2, inf where nothing bounds the speed alone
     names: tuple[str, ...]  # limits
-    row_owner: Index  # (R,) which limit a row belongs to
+    row_owner: IndexArray  # (R,) which limit a row belongs to
     bounds: Array  # (L, G) m^2/s^2, what each limit says of the speed alone
     edges: tuple[float, ...]  # path parameters that should be gridpoints
 
     @property
-    def kept(self) -> Index:
+    def kept(self) -> IndexArray:
         """Indices of the gridpoints, each once."""
         return np.flatnonzero(np.concatenate([[True], np.diff(self.s) > 0]))
 
@@ -64,7 +61,7 @@ class FineRows:
     c: Array  # (N, F, R)
     bounds: Array  # (N, F, L)
     names: tuple[str, ...]
-    row_owner: Index  # (R,)
+    row_owner: IndexArray  # (R,)
     edges: tuple[float, ...]
 
 

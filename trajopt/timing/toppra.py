@@ -7,13 +7,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, IndexArray
 from trajopt.errors import InfeasibleError
 from trajopt.timing.feasibility import allowed_end, empty_set, require_bounded, require_start_speed
 from trajopt.timing.stages import SD2_CAP, Stages
-
-Array = NDArray[np.float64]
 
 
 def toppra_profile(stages: Stages, start: float, end: float) -> Array:
@@ -45,7 +43,7 @@ def toppra_profile(stages: Stages, start: float, end: float) -> Array:
     return np.asarray(np.asarray(speed, dtype=np.float64)[group] ** 2)
 
 
-def _instance(stages: Stages, kept: NDArray[np.intp], grid: Array) -> Any:
+def _instance(stages: Stages, kept: IndexArray, grid: Array) -> Any:
     """The TOPPRA instance: per interval the rows of its left end and of its right end."""
     from toppra.algorithm import TOPPRA
     from toppra.constraint import LinearConstraint

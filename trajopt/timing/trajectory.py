@@ -9,8 +9,9 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
@@ -19,8 +20,6 @@ from trajopt.robots.platform import Platform
 from trajopt.timing.stages import Check, check, fine_rows
 from trajopt.timing.wheels import WheelTable, wheel_table
 from trajopt.world.terrain import Terrain
-
-Array = NDArray[np.float64]
 
 _BINDS = 2e-3  # relative margin below which a limit counts as binding; above the largest slow-down (0.1 %)
 _ON_TIME = 1e-12  # share of the duration by which a time may lie outside through rounding

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
 from trajopt.robots.platform import Platform
-
-Array = NDArray[np.float64]
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
 _FIRST_CELLS, _MOST_CELLS = (

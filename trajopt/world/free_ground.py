@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.paths.path import Path
-
-Array = NDArray[np.float64]
 
 FINE_STEPS = 360  # steps along a path when it is checked, chosen: 6 mm on a 2 m path
 

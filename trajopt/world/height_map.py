@@ -11,12 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path as FilePath
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, require_finite, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
-
-Array = NDArray[np.float64]
 
 LARGEST_GRID = 4_000_000  # points; 32 MB as doubles, a 40 m square at 2 cm; chosen
 _CHECKS_PER_CELL = 2  # path samples a grid cell when slopes are checked; chosen
@@ -38,12 +37,8 @@ class HeightMap:
 
     def __post_init__(self) -> None:
         _require_grid("terrain.heights", self.heights)
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise ArgumentError(
-                "terrain.spacing", self.spacing, "a finite distance > 0 m between grid points"
-            )
-        if not np.all(np.isfinite(self.origin)):
-            raise ArgumentError("terrain.origin", self.origin, "finite coordinates, m")
+        require_positive("terrain.spacing", self.spacing, "m between grid points")
+        require_finite("terrain.origin", self.origin, "m")
         if not 0 < self.grade < np.pi / 2:
             raise ArgumentError("terrain.grade", self.grade, "an angle between 0 and pi/2 rad")
 

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, require_finite, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
 from trajopt.paths.spline import SplineBasis
-
-Array = NDArray[np.float64]
 
 _EDGE_KNOTS = (
     8  # knots across a rounded edge when a path is laid over a ramp; chosen: z within 0.1 mm
@@ -38,10 +36,8 @@ class Ramp:
 
     def __post_init__(self) -> None:
         for name in ("run", "rounding"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ArgumentError(f"ramp.{name}", getattr(self, name), "a finite length > 0 m")
-        if not np.all(np.isfinite([*self.place, self.direction, self.height])):
-            raise ArgumentError("ramp", self, "finite numbers")
+            require_positive(f"ramp.{name}", getattr(self, name), "m")
+        require_finite("ramp", [*self.place, self.direction, self.height])
 
     def along(self, x: Array, y: Array) -> Array:
         """Distance from the foot line along the ramp, m."""

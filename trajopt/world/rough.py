@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
+from trajopt.arrays import require_not_negative
 from trajopt.errors import ArgumentError
 from trajopt.world.height_map import LARGEST_GRID, HeightMap
 
@@ -33,8 +34,7 @@ def rough_ground(
         ("correlation", correlation),
         ("flat_radius", flat_radius),
     ):
-        if not (np.isfinite(value) and value >= 0):
-            raise ArgumentError(name, value, "a finite length >= 0 m")
+        require_not_negative(name, value, "m")
     if not (np.isfinite(size) and np.isfinite(spacing) and 0 < spacing < size):
         raise ArgumentError("spacing", (spacing, size), "0 < spacing < size, m")
     count = round(size / spacing) + 1

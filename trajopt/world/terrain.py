@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, require_finite
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
-
-Array = NDArray[np.float64]
 
 
 class Terrain(Protocol):
@@ -51,8 +49,7 @@ class Step:
     def __post_init__(self) -> None:
         if not np.isfinite(self.rise) or self.rise == 0:
             raise ArgumentError("terrain.rise", self.rise, "a finite height different from 0 m")
-        if not (np.isfinite(self.x) and np.isfinite(self.direction)):
-            raise ArgumentError("terrain.x", (self.x, self.direction), "finite numbers")
+        require_finite("terrain.x, direction", (self.x, self.direction), "m, rad")
 
     def height(self, x: Array, y: Array) -> Array:
         along = x * np.cos(self.direction) + y * np.sin(self.direction)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from trajopt.errors import ArgumentError
+from trajopt.arrays import Array, require_positive
 from trajopt.world.height_map import HeightMap
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +31,7 @@ def wheel_contact(
     line that lifts it most, z(s) + sqrt(radius^2 - s^2): a break, or where a straight piece is
     tangent. Exact.
     """
-    if not (np.isfinite(radius) and radius > 0):
-        raise ArgumentError("radius", radius, "a finite wheel radius > 0 m")
+    require_positive("radius", radius, "m")
     px, py, angle = np.broadcast_arrays(
         *(np.atleast_1d(np.asarray(v, dtype=np.float64)) for v in (x, y, heading))
     )

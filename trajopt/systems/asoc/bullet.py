@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.robots.platform import STANDARD_GRAVITY
 from trajopt.simulate.pybullet import load_bullet
@@ -32,8 +32,6 @@ from trajopt.systems.asoc.run import (
 )
 from trajopt.systems.asoc.tracking import Knowledge
 from trajopt.world.height_map import HeightMap
-
-Array = NDArray[np.float64]
 
 BREAKING = 0.001  # m; Bullet's 20 mm keep contacts in the air
 PIVOT_TORQUE = 20.0  # N m at most of driven pivots, chosen

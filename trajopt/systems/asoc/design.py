@@ -22,16 +22,15 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
 from trajopt.robots.platform import STANDARD_GRAVITY
 from trajopt.systems.asoc.isotropy_curve import IsotropyCurve, isotropy_curve
 from trajopt.systems.asoc.modules import BODY_LENGTH, TOTAL_MASS, envelope
 from trajopt.systems.asoc.soil import Soil
-
-Array = NDArray[np.float64]
 
 FIXED_SHARE = 0.15  # of the total mass, structure and electronics (thesis 001, section 3.2)
 MODULE_SHARE = 0.05  # of the total mass, one module without wheels (section 3.2)

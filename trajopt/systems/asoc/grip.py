@@ -22,12 +22,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.robots.platform import STANDARD_GRAVITY
 from trajopt.systems.asoc.modules import TOTAL_MASS, AsocGeometry
-
-Array = NDArray[np.float64]
 
 PROPORTIONAL = 7.3  # N m s/rad, K_p of thesis 001, section 4.3 (unit inferred)
 DERIVATIVE = 0.02  # N m s^2/rad, K_d of section 4.3 (unit inferred)

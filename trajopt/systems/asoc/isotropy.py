@@ -20,11 +20,11 @@ from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, require_positive
 from trajopt.errors import ArgumentError
 
-Array = NDArray[np.float64]
 Jacobian = Literal["inverse", "forward"]
 
 POINTS = 4096  # of the lattice; error below 1e-3 on all of Table I, chosen
@@ -78,8 +78,7 @@ def isotropy(
     not fit.
     """
     p, a, contact = _checked(positions, alpha, contact or Contact())
-    if not (np.isfinite(length) and length > 0):
-        raise ArgumentError("length", length, "a finite length > 0 m")
+    require_positive("length", length, "m")
     if jacobian not in ("inverse", "forward"):
         raise ArgumentError("jacobian", jacobian, "inverse or forward")
     effective = np.broadcast_to(np.asarray(ratio) * np.cos(tilt), a.shape)

@@ -12,11 +12,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.systems.asoc.isotropy import mean_isotropy, spread_modules
-
-Array = NDArray[np.float64]
 
 LOWEST_RATIO, HIGHEST_RATIO = 0.5, 10.0  # split/offset that the design space can reach, chosen
 PEAK = (1.4, 4.0)  # ratios between which knots are dense, chosen: Table II's optima lie inside

@@ -12,13 +12,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.robots.platform import Body, Platform
 from trajopt.robots.wheel import Wheel, WheelKind
-
-Array = NDArray[np.float64]
 
 TOTAL_MASS = 65.0  # kg, thesis 001 sections 3 and 4.3
 BODY_LENGTH = 1.0  # m, thesis 001 section 4.3
@@ -54,8 +53,7 @@ class AsocGeometry:
             )
         for name in ("split", "offset", "wheel_radius", "wheel_width", "module_radius"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise ArgumentError(name, value, "a finite length > 0 m")
+            require_positive(name, value, "m")
 
     @property
     def angles(self) -> Array:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import SimulationError
 from trajopt.robots.platform import STANDARD_GRAVITY
 from trajopt.simulate.mujoco import load_mujoco
@@ -31,8 +31,6 @@ from trajopt.systems.asoc.run import (
 )
 from trajopt.systems.asoc.tracking import Knowledge
 from trajopt.world.height_map import HeightMap
-
-Array = NDArray[np.float64]
 
 CONTACT = "0.004 1"  # s and damping ratio: the shortest contact time that 2 ms steps allow
 BASE = 0.5  # m of solid below the lowest point, chosen

@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION, new_figure
-
-Array = NDArray[np.float64]
 
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK)
 DASHES = (

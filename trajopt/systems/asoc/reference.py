@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
@@ -17,8 +18,6 @@ from trajopt.systems.asoc.modules import AsocGeometry, largest_pivot, wheel_posi
 from trajopt.timing.scaling import time_scale
 from trajopt.world.height_map import HeightMap
 from trajopt.world.wheel_contact import wheel_contact
-
-Array = NDArray[np.float64]
 
 SIDE = 4.5  # m, square of thesis 001, section 4.3
 SPEED = 1.5  # m/s, section 4.3
@@ -64,8 +63,7 @@ def square_corners(side: float = SIDE) -> Array:
 def constant_speed(corners: ArrayLike, speed: float = SPEED) -> Reference:
     """The thesis's command: one speed along every side, turned in no time at the corners."""
     points = _checked(corners)
-    if not (np.isfinite(speed) and speed > 0):
-        raise ArgumentError("speed", speed, "a finite speed > 0 m/s")
+    require_positive("speed", speed, "m/s")
     sides = np.diff(points, axis=0)
     length = np.linalg.norm(sides, axis=1)
     times = np.concatenate([[0.0], np.cumsum(length / speed)])

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import AnyArray, Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.robots.platform import STANDARD_GRAVITY
 from trajopt.systems.asoc.design import MODULE_SHARE, RUBBER
@@ -30,8 +30,6 @@ from trajopt.systems.asoc.tracking import (
     wheel_commands,
 )
 from trajopt.world.height_map import HeightMap
-
-Array = NDArray[np.float64]
 
 FRICTION = 0.6  # thesis 001, section 4.3
 STEP = 0.002  # s, of the engines; measured on other robots of this package: 10 ms drifts
@@ -60,8 +58,7 @@ class AsocBody:
     driven_pivots: bool = False
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.friction) and self.friction > 0):
-            raise ArgumentError("friction", self.friction, "a friction coefficient > 0")
+        require_positive("friction", self.friction, "(friction coefficient)")
         if self.body_mass <= 0:
             raise ArgumentError(
                 "geometry", self.geometry, f"wheels that leave mass out of {TOTAL_MASS} kg"
@@ -113,7 +110,7 @@ class AsocState:
     rotation: Array
     alpha: Array
     spins: Array
-    touch: NDArray[np.bool_]
+    touch: BoolArray
 
 
 class AsocSession(Protocol):
@@ -139,7 +136,7 @@ class AsocRun:
     times: Array
     pose: Array
     roll_pitch: Array
-    touch: NDArray[np.bool_]
+    touch: BoolArray
     wanted: Array
     cross_track: Array
     wall_time: float
@@ -183,7 +180,7 @@ def run_asoc(
     begun = time.perf_counter()
     for _ in range(round(SETTLE / STEP)):
         session.advance(still, still[:, 0])
-    rows: list[tuple[NDArray[Any], ...]] = []
+    rows: list[tuple[AnyArray, ...]] = []
     control = STEP * CONTROL_STRIDE
     estimate, due = np.zeros(3), 0.0
     for moment in np.arange(0.0, reference.duration + control / 2, control):

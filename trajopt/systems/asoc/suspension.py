@@ -18,6 +18,7 @@ from enum import Enum
 
 import numpy as np
 
+from trajopt.arrays import require_positive
 from trajopt.errors import ArgumentError
 from trajopt.systems.asoc.modules import AsocGeometry, workspace_radius
 
@@ -51,8 +52,7 @@ class FourBar:
 
     def __post_init__(self) -> None:
         for name in ("length", "spacing", "thickness", "clearance"):
-            if not (np.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ArgumentError(name, getattr(self, name), "a finite length > 0 m")
+            require_positive(name, getattr(self, name), "m")
         if not 0 <= self.arch < np.inf:
             raise ArgumentError("arch", self.arch, "a finite length >= 0 m")
         if self.spacing <= self.thickness:

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.robots.platform import STANDARD_GRAVITY
 from trajopt.systems.asoc.grip import Footing, Motion, next_motion
@@ -29,8 +29,6 @@ from trajopt.systems.asoc.modules import (
 from trajopt.systems.asoc.reference import Reference
 from trajopt.world.height_map import HeightMap
 from trajopt.world.wheel_contact import wheel_contact
-
-Array = NDArray[np.float64]
 
 FRICTION = 0.6  # thesis 001, section 4.3
 UPDATE_PERIOD = 2.0  # s, position updates at 0.5 Hz (section 4.3)
@@ -175,8 +173,7 @@ def track_many(
     """
     if not friction > 0:
         raise ArgumentError("friction", friction, "a value > 0 (inf: wheels never slide)")
-    if not (np.isfinite(step) and step > 0):
-        raise ArgumentError("step", step, "a finite value > 0 s")
+    require_positive("step", step, "s")
     if np.shape(origins) != (len(knowledge), 2) or len(knowledge) == 0:
         raise ArgumentError(
             "origins", np.shape(origins), f"shape ({len(knowledge)}, 2): one place a robot"

@@ -15,8 +15,8 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold, require_positive
 from trajopt.control.tracking import Tracker
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.simulate.engine import GRAVITY
@@ -24,8 +24,6 @@ from trajopt.simulate.pybullet import load_bullet
 from trajopt.systems.powerbot.model import DriveRobot, drive_urdf
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import Ramp
-
-Array = NDArray[np.float64]
 
 _STRIP = 0.05  # m between the ramp mesh's edges across its rounded parts; chosen
 _RAMP_WIDTH = 12.0  # m, chosen: wider than any path over it
@@ -54,8 +52,7 @@ class Floor:
     walls: tuple[Wall, ...] = ()
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.friction) and self.friction > 0):
-            raise ArgumentError("friction", self.friction, "a finite coefficient > 0")
+        require_positive("friction", self.friction, "(coefficient)")
 
 
 @dataclass(frozen=True)
@@ -102,12 +99,12 @@ class DriveRecord:
     @property
     def final_heading_error(self) -> float:
         """rad."""
-        return float(abs(_folded(self.pose[-1, 2] - self.planned[-1, 2])))
+        return float(abs(fold(self.pose[-1, 2] - self.planned[-1, 2])))
 
     @property
     def heading_error(self) -> float:
         """Root mean square, rad."""
-        return float(np.sqrt(np.mean(_folded(self.pose[:, 2] - self.planned[:, 2]) ** 2)))
+        return float(np.sqrt(np.mean(fold(self.pose[:, 2] - self.planned[:, 2]) ** 2)))
 
     @property
     def speed_error(self) -> float:
@@ -132,8 +129,7 @@ def drive_in_pybullet(
     pybullet, SimulationError when the numbers leave physics, ArgumentError for a factor that is not
     positive.
     """
-    if not (np.isfinite(faster) and faster > 0):
-        raise ArgumentError("faster", faster, "a finite factor > 0")
+    require_positive("faster", faster, "(factor)")
     options = DriveOptions() if options is None else options
     start = trajectory.at(0.0).pose[0]
     cos, sin = np.cos(start[2]), np.sin(start[2])
@@ -421,10 +417,6 @@ def _wall(bullet: Any, client: int, wall: Wall) -> int:
             0.0, shape, -1, (*middle.tolist(), _WALL_HEIGHT / 2), turned, physicsClientId=client
         )
     )
-
-
-def _folded(angle: Any) -> Any:
-    return (angle + np.pi) % (2 * np.pi) - np.pi
 
 
 def slip_share(slip: Array, speed: Array) -> float:

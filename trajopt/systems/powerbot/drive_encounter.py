@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold
 from trajopt.control.encounter import Course, Obstacle, World
 from trajopt.control.replan import TIME_STEP, Planner, Run, Sensor, SpeedPlan, replan, run_encounter
 from trajopt.control.tracking import Tracker
@@ -24,8 +24,6 @@ from trajopt.systems.powerbot.differential import (
     slip_share,
 )
 from trajopt.systems.powerbot.model import DriveRobot
-
-Array = NDArray[np.float64]
 
 _HEIGHT = 1.0  # m, of an obstacle; chosen: higher than the robot
 _STILL = 0.02  # m/s, chosen: below it the robot counts as standing
@@ -92,7 +90,7 @@ def drive_encounter(
         )
     planned = where.poses(run.s)
     off = np.hypot(*(run.pose - planned)[:, :2].T)
-    heading = (run.pose[-1, 2] - planned[-1, 2] + np.pi) % (2 * np.pi) - np.pi
+    heading = fold(run.pose[-1, 2] - planned[-1, 2])
     return DrivenEncounter(
         run,
         np.array([0.0, *driver.speeds]),

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trajopt.arrays import require_positive
 from trajopt.errors import ArgumentError
 from trajopt.robots.platform import STANDARD_GRAVITY
 
@@ -62,8 +63,7 @@ def friction_from_pulls(
         ("cog_to_drive", cog_to_drive),
         ("cog_to_caster", cog_to_caster),
     ):
-        if not (np.isfinite(value) and value > 0):
-            raise ArgumentError(name, value, "a finite value > 0")
+        require_positive(name, value)
     scatter = float(np.std(pulls, ddof=1) / np.sqrt(len(pulls))) if len(pulls) > 1 else 0.0
 
     def friction(x: Sequence[float]) -> float:
@@ -109,8 +109,7 @@ def centre_of_gravity(
     w / (m tan(t)) above the axles. Raises ArgumentError for readings that cannot be.
     """
     for name, value in (("mass", mass), ("wheelbase", wheelbase), ("rise", rise)):
-        if not (np.isfinite(value) and value > 0):
-            raise ArgumentError(name, value, "a finite value > 0")
+        require_positive(name, value)
     if not rise < wheelbase:
         raise ArgumentError("rise", rise, f"a rise below the wheelbase {wheelbase} m")
     for name, value in (

@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from trajopt.limits.limit import Rows, linear_rows, require_positive, speed_rows
+from trajopt.arrays import Array, require_positive
+from trajopt.limits.limit import Rows, linear_rows, speed_rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
-
-Array = NDArray[np.float64]
 
 GRAVITY = 9.81  # m/s^2, the thesis's
 SLIP_COSINE = 9.95  # m/s^2 (eq. 2.20, printed coefficient)

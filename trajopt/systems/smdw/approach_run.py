@@ -7,15 +7,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold
 from trajopt.control.approach import ApproachController
 from trajopt.control.bend import Goal
-from trajopt.objectives.terminal import folded
 from trajopt.simulate.engine import Command, Controller, Observation, Recording
 from trajopt.systems.smdw.climb import StepScene, run_approach
 
-Array = NDArray[np.float64]
 SETTLE = 1.2  # s after the reference's end until errors are taken, chosen: corrections on the spot end within it
 
 
@@ -72,10 +70,10 @@ def run_controlled(
 def ending_of(recording: Recording, goal: Goal) -> Ending:
     """Errors of the last state against a goal."""
     pose = recording.pose[-1] - goal.pose
-    phase = folded((recording.wheel_angles[-1] - goal.wheels)[list(goal.critical)], 2 * math.pi)
+    phase = fold((recording.wheel_angles[-1] - goal.wheels)[list(goal.critical)])
     return Ending(
         math.hypot(pose[0], pose[1]),
-        abs(float(folded(pose[2], 2 * math.pi))),
+        abs(float(fold(pose[2]))),
         float(np.abs(phase).max()),
         recording.exploded,
     )

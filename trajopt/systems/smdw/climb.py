@@ -15,7 +15,6 @@ from functools import lru_cache
 from multiprocessing import get_context
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError
 from trajopt.robots.loc8 import WHEEL_RADIUS
@@ -24,7 +23,6 @@ from trajopt.simulate.scene import Scene, Step
 from trajopt.systems.smdw.geometry import DoubleWheel
 from trajopt.systems.smdw.wheel import loc8_smdw
 
-Array = NDArray[np.float64]
 Four = tuple[float, float, float, float]
 
 CLIMB_TIME = 2.0  # s, SMDW thesis section 6.1

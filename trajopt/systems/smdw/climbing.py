@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.robots.loc8 import HALF_TRACK, HALF_WHEELBASE, WHEEL_RADIUS, loc8
 from trajopt.robots.platform import STANDARD_GRAVITY, Platform
@@ -30,8 +30,6 @@ from trajopt.systems.smdw.geometry import (
     meet_step,
     support_down,
 )
-
-Array = NDArray[np.float64]
 
 DEFAULT_WHEEL = DoubleWheel()
 # Sizes that give the printed contact offsets, 4.63 cm at 30 deg and 3.49 cm at 60 deg (Figure

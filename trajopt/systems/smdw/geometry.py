@@ -23,12 +23,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.robots.loc8 import WHEEL_RADIUS
-
-Array = NDArray[np.float64]
 
 # Rc is the rolling radius. Re: 5 cm steps need Rc - Re > 5 cm, which the 4.8 cm of 0.098/0.05 m
 # does not give and the sizes fitted to the printed contact offsets (4.75 cm) do not either,
@@ -53,8 +52,7 @@ class DoubleWheel:
     gap: float = HUB_GAP
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.radius) and self.radius > 0):
-            raise ArgumentError("radius", self.radius, "a length > 0 m")
+        require_positive("radius", self.radius, "m")
         if not 0 < self.minor_radius <= self.radius:
             raise ArgumentError(
                 "minor_radius", self.minor_radius, f"a length in (0, {self.radius:g}] m"
@@ -87,7 +85,7 @@ class Meeting:
     ``line`` (m): distance of the collision line from the axle along the step's normal.
     """
 
-    over: NDArray[np.bool_]
+    over: BoolArray
     clearance: Array
     offset: Array
     arm: Array
@@ -204,7 +202,7 @@ def outline(wheel: DoubleWheel, points: int = CLOUD_POINTS) -> Array:
 
 def _roles(
     wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: float
-) -> tuple[Array, Array, Array, Array, NDArray[np.bool_], Array, Array]:
+) -> tuple[Array, Array, Array, Array, BoolArray, Array, Array]:
     """Broadcast angles, the step's normal in the wheel frame, and which hub carries, with both
     hubs' angles."""
     if not 0 < height < wheel.radius:
@@ -228,7 +226,7 @@ def _roles(
     )
 
 
-def _faces(wheel: DoubleWheel, facing_lifted: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _faces(wheel: DoubleWheel, facing_lifted: BoolArray) -> tuple[Array, Array]:
     """y (m) of the face nearest to the step: of the carrying hub and of the lifted one."""
     outside, inside = wheel.gap / 2 + wheel.depth, -wheel.gap / 2
     return np.where(facing_lifted, inside, outside), np.where(facing_lifted, outside, inside)
@@ -250,9 +248,7 @@ def _reach(wheel: DoubleWheel, angle: Array, level: float, side: Array) -> Array
     return np.asarray(side * np.where(tip_z <= level, tip, at_level))
 
 
-def _lower_boundary(
-    wheel: DoubleWheel, angle: Array, x: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _lower_boundary(wheel: DoubleWheel, angle: Array, x: Array) -> tuple[Array, Array, BoolArray]:
     """z (m over the axle) and slope of a hub's lower boundary at ``x`` (m), and whether it reaches
     that far."""
     s, c = np.sin(angle), np.cos(angle)

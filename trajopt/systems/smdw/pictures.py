@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.report.ground_plan import draw_robot
 from trajopt.report.style import (
     BLACK,
@@ -38,7 +38,6 @@ from trajopt.systems.smdw.geometry import DoubleWheel, contact_offset, meet_step
 from trajopt.systems.smdw.planner import Maneuver, Plan
 from trajopt.systems.smdw.problem import ManeuverProblem
 
-Array = NDArray[np.float64]
 Pose = tuple[float, float, float]  # m, m, rad
 
 _OUTLINES = 7  # robot outlines drawn along a path

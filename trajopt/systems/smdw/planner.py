@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, fold, rotation
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.base import AffinePart
 from trajopt.objectives.clearance import ClearObjective
-from trajopt.objectives.terminal import TerminalObjective, folded
+from trajopt.objectives.terminal import TerminalObjective
 from trajopt.optimize.base import Budget, Optimizer
 from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import minimize
@@ -44,8 +44,6 @@ from trajopt.timing.compiled import load_kernel
 from trajopt.timing.scaling import rough_duration, time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import path_margin
-
-Array = NDArray[np.float64]
 
 THESIS_ALPHAS = (
     math.radians(35.0),
@@ -225,7 +223,7 @@ def _configuration(
         return None
     sideways = {Motion.FORWARD: 0.0, Motion.LEFT: -math.pi / 2, Motion.RIGHT: math.pi / 2}[motion]
     yaw = obstacle.direction + alpha + sideways
-    yaw = start_yaw + float(folded(yaw - start_yaw, 2 * math.pi))
+    yaw = start_yaw + float(fold(yaw - start_yaw))
     critical: tuple[WheelName, WheelName] = ("front-left", "front-right")
     if motion is Motion.FORWARD and alpha > 0:
         critical = ("front-right", "front-left")
@@ -248,16 +246,16 @@ def approach_target(
     """
     c, robot, step = configuration, problem.platform, problem.obstacle
     phase = c.window.middle if phase is None else phase
-    rotation, normal = _rotation(c.yaw), np.array(step.normal)
-    motion = rotation @ c.direction
-    corners = np.array(robot.footprint) @ rotation.T @ normal
+    turn, normal = rotation(c.yaw), np.array(step.normal)
+    motion = turn @ c.direction
+    corners = np.array(robot.footprint) @ turn.T @ normal
     room = problem.approach.gap + float(corners.max())  # of the robot's centre, along the normal
     places = _wheel_places(robot)
     travel = _travel(problem, c, room, c.yaw, phase)
     lead = (
-        rotation @ (places[c.critical[0]] + places[c.critical[1]]) / 2
+        turn @ (places[c.critical[0]] + places[c.critical[1]]) / 2
         if c.motion.lateral
-        else rotation @ places[c.critical[0]]
+        else turn @ places[c.critical[0]]
     )
     along = np.array([-normal[1], normal[0]])
     aside = float(along @ (np.array(step.place) - lead - travel[0] * motion))
@@ -298,19 +296,11 @@ def _travel(
 ) -> tuple[float, float]:
     """The same with the robot's centre ``room`` (m) before the step, for a ``phase`` (rad) of
     contact."""
-    c, normal, rotation = configuration, np.array(problem.obstacle.normal), _rotation(yaw)
+    c, normal, turn = configuration, np.array(problem.obstacle.normal), rotation(yaw)
     reach = collision_reach(problem.robot.wheel, phase, c.motion, c.alpha, problem.obstacle.height)
-    places, ahead = _wheel_places(problem.platform), normal @ (rotation @ c.direction)
-    first, second = (
-        float((room - normal @ rotation @ places[w] - reach) / ahead) for w in c.critical
-    )
+    places, ahead = _wheel_places(problem.platform), normal @ (turn @ c.direction)
+    first, second = (float((room - normal @ turn @ places[w] - reach) / ahead) for w in c.critical)
     return first, second
-
-
-def _rotation(yaw: float) -> Array:
-    """(2, 2): body to world."""
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    return np.array([[cos, -sin], [sin, cos]])
 
 
 def _wheel_places(robot: Platform) -> dict[WheelName, Array]:
@@ -508,7 +498,7 @@ def _plan(
 ) -> Plan:
     made, path = objective.terminal.problem, trajectory.path
     end = trajectory.at(trajectory.duration).wheel_angles[0] + np.array(problem.start.wheels)
-    errors = folded(end - np.array(target.wheels), made.objective.period)[
+    errors = fold(end - np.array(target.wheels), made.objective.period)[
         list(made.goal.critical_indices)
     ]
     assert path.heading is not None  # the objective's paths choose their heading

@@ -18,11 +18,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.report.style import BLACK, BLUE, GREY, ORANGE, VERMILION, new_figure
 
-Array = NDArray[np.float64]
 Box = tuple[tuple[float, float], tuple[float, float]]  # x and y range, m
 
 _WIDE = 8.4  # inch

@@ -10,18 +10,16 @@ from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich import box
 from rich.table import Table
 
+from trajopt.arrays import Array
 from trajopt.report.files import made_folder, write_json, write_text
 from trajopt.report.provenance import commit, run_facts, versions
 from trajopt.systems.smdw.climb import wilson
 from trajopt.systems.smdw.planner import Plan
 from trajopt.systems.smdw.problem import ManeuverProblem
 from trajopt.systems.smdw.trials import ClimbTrial
-
-Array = NDArray[np.float64]
 
 COLUMNS = (
     "number",

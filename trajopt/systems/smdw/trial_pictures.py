@@ -14,8 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.report.ground_plan import draw_robot
 from trajopt.report.style import (
     BLACK,
@@ -31,8 +31,6 @@ from trajopt.report.style import (
 )
 from trajopt.robots.platform import Platform
 from trajopt.systems.smdw.climb import wilson
-
-Array = NDArray[np.float64]
 
 _SOURCE_COLOURS = (BLUE, ORANGE, GREY, GREEN)
 _WIDE = 0.8  # share of the room of a group that its bars take

@@ -16,8 +16,8 @@ from multiprocessing import get_context
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array, require_not_negative
 from trajopt.control.approach import Mode, Sensors, approach_controller
 from trajopt.control.bend import Goal
 from trajopt.errors import ArgumentError
@@ -38,8 +38,6 @@ from trajopt.systems.smdw.climb import (
 from trajopt.systems.smdw.planner import Configuration, Plan, travel_to_step
 from trajopt.systems.smdw.problem import ManeuverProblem
 
-Array = NDArray[np.float64]
-
 NEAREST = 0.004  # m, least gap to the step that a climb starts with; chosen
 
 
@@ -56,10 +54,7 @@ class Scatter:
 
     def __post_init__(self) -> None:
         for name in ("position", "yaw", "wheels"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0):
-                raise ArgumentError(
-                    f"scatter.{name}", getattr(self, name), "a finite standard deviation >= 0"
-                )
+            require_not_negative(f"scatter.{name}", getattr(self, name), "(standard deviation)")
         if not 0 <= self.friction < 1:
             raise ArgumentError("scatter.friction", self.friction, "a share from 0 to less than 1")
 

@@ -13,12 +13,12 @@ import math
 
 import numpy as np
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.robots.loc8 import WHEEL_MASS
 from trajopt.simulate.engine import SimRobot
 from trajopt.simulate.rollers import (
     ROLLER_MASS,
-    FloatArray,
     Roller,
     RollerWheel,
     Seat,
@@ -66,7 +66,7 @@ def smdw_wheel(
     for radius in (circle_roller_radius, ellipse_roller_radius):
         require_wheel(sizes.radius, radius, angle, hub_mass, roller_mass)
 
-    def support(phi: FloatArray) -> FloatArray:
+    def support(phi: Array) -> Array:
         return support_down(sizes, phi)
 
     pitch = math.pi / circle_rollers
