@@ -18,8 +18,6 @@ import numpy as np
 
 from benchmarks.common import PROBLEMS, ResultTable, publish
 from trajopt.arrays import Array
-from trajopt.objectives import compiled
-from trajopt.objectives.rollout import step_grid
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective, with_free
 from trajopt.optimize.base import Budget
 from trajopt.optimize.pso import ParticleSwarm
@@ -67,40 +65,15 @@ def kernels(repeats: int) -> tuple[list[tuple[str, ...]], list[float]]:
     for free in (("p2",), ("p1", "p2"), ("p1", "p2", "heading")):
         asked = objective(*free)
         z = np.random.default_rng(0).uniform(*asked.bounds.T, size=(PARTICLES, asked.dimension))
-        readable = best_of(partial(_numpy_cost, asked, z), max(3, repeats // 10))
+        readable = best_of(partial(asked.evaluate_readable, z), max(3, repeats // 10))
         fast = best_of(partial(asked.evaluate, z), repeats)
-        points = asked.control_points(z.T)
-        general = best_of(
-            lambda a=asked, p=points: compiled.roll_out_swarm(  # type: ignore[misc]
-                step_grid(a.basis, a.steps), a.model, a.actuator, p.x, p.y, p.yaw, p.duration
-            ),
-            max(3, repeats // 4),
-        )
-        error = float(np.max(np.abs(asked.evaluate(z).cost - _numpy_cost(asked, z))))
-        times = (f"{seconds * 1e3:.3f}" for seconds in (readable, general, fast))
+        error = float(np.max(np.abs(asked.evaluate(z).cost - asked.evaluate_readable(z).cost)))
+        times = (f"{seconds * 1e3:.3f}" for seconds in (readable, fast))
         rows.append(
             ("+".join(free), str(asked.steps), *times, f"{readable / fast:.1f}", f"{error:.1e}")
         )
         ratios.append(readable / fast)
     return rows, ratios
-
-
-def _numpy_cost(asked: TerminalObjective, z: Array) -> Array:
-    """The vectorised NumPy form: ``roll_out`` and the named terms, no numba."""
-    from trajopt.objectives.rollout import roll_out
-
-    points = asked.control_points(z.T)
-    end = roll_out(
-        step_grid(asked.basis, asked.steps),
-        asked.model,
-        asked.actuator,
-        points.x,
-        points.y,
-        points.yaw,
-        points.duration,
-    )
-    terms = [np.broadcast_to(t, (1, len(z)))[0] for t in asked.named_terms(end).values()]
-    return np.asarray(np.sum(terms, axis=0))
 
 
 def searches(repeats: int) -> tuple[list[tuple[str, ...]], float]:
@@ -109,7 +82,9 @@ def searches(repeats: int) -> tuple[list[tuple[str, ...]], float]:
     budget = Budget(PARTICLES * ITERATIONS)
     ours = best_of(lambda: minimize(asked, asked.bounds, optimizer="pso", budget=budget), repeats)
     peer = best_of(
-        lambda: _pyswarms(partial(_numpy_cost, asked), asked.bounds, PARTICLES, ITERATIONS),
+        lambda: _pyswarms(
+            lambda x: asked.evaluate_readable(x).cost, asked.bounds, PARTICLES, ITERATIONS
+        ),
         max(1, repeats // 3),
     )
     fair = best_of(
@@ -188,7 +163,6 @@ def main() -> None:
                 "free",
                 "steps",
                 "NumPy",
-                "general kernel",
                 "evaluate",
                 "NumPy / evaluate",
                 "difference",

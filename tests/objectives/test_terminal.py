@@ -14,7 +14,7 @@ from smdw_problems import ROOT, smdw_problem
 
 from trajopt.arrays import fold
 from trajopt.errors import ArgumentError
-from trajopt.objectives.rollout import Kinematics, roll_out, step_grid
+from trajopt.objectives.rollout import Kinematics
 from trajopt.objectives.terminal import (
     TerminalObjective,
     on_grid,
@@ -122,35 +122,34 @@ def test_step_averages_converge_to_the_exact_prediction(scenario):
 
 def test_numba_and_numpy_agree():
     pytest.importorskip("numba")
-    from trajopt.objectives import compiled
-
     rng = np.random.default_rng(3)
     for name in ("table_5_3", "table_5_3_1s", "scenario_2_lateral"):
         objective = terminal_objective(
             with_actuator(smdw_problem(name), "p1", "p2", "heading", "duration")
         )
         z = rng.uniform(*objective.bounds.T, (40, objective.dimension)).T
-        points, grid = objective.control_points(z), step_grid(objective.basis, 252)
-        assert compiled.fits(grid, objective.model, points.yaw)
-        a = roll_out(
-            grid,
-            objective.model,
-            objective.actuator,
-            points.x,
-            points.y,
-            points.yaw,
-            points.duration,
+        assert objective._compiled is not None
+        assert objective._compiled[0].fits(z.T)
+        a, b = objective.predict_readable(z), objective.predict(z)
+        assert a.x is not b.x
+        for name in ("x", "y", "yaw", "wheels"):
+            np.testing.assert_allclose(getattr(b, name), getattr(a, name), atol=1e-12)
+
+
+def test_turns_too_large_for_the_kernel_are_predicted_readably(scenario):
+    objective = terminal_objective(with_actuator(scenario, "p1", "p2", "heading"))
+    z = np.tile(objective.default[:, None], 2)
+    z[objective.names.index("p1.yaw_rad"), 1] += 100.0
+    one, both = objective.predict(z[:, :1]), objective.predict(z)
+    for name in ("x", "y", "yaw", "wheels"):
+        np.testing.assert_allclose(
+            getattr(both, name), getattr(objective.predict_readable(z), name)
         )
-        b = compiled.roll_out_swarm(
-            grid,
-            objective.model,
-            objective.actuator,
-            points.x,
-            points.y,
-            points.yaw,
-            points.duration,
+        np.testing.assert_allclose(
+            np.asarray(getattr(both, name))[..., 0],
+            np.asarray(getattr(one, name))[..., 0],
+            atol=1e-11,
         )
-        np.testing.assert_allclose(b, np.vstack([a.x, a.y, a.yaw, *a.wheels]), atol=1e-12)
 
 
 def test_a_swarm_is_its_candidates(problem):

@@ -3,7 +3,7 @@
 The formulas are those of ``rollout``, as in ``swarm``: control values enter each step through
 constant rows, start and goal through one constant. Sines and cosines are not evaluated: every
 rotation is the previous one turned by a small increment (``swarm.turned``), exact to rounding up to
-``compiled.MAX_INCREMENT``. Candidates run in blocks of LANES over one flat state, so that the
+``swarm.MAX_INCREMENT``. Candidates run in blocks of LANES over one flat state, so that the
 innermost loop becomes vector instructions. A test holds the result together with
 ``rollout.roll_out`` to 1e-12. What is alike in ``swarm._block`` stays written out twice: there the
 heading is known before the search, which removes most of the work of a step, and both need all
@@ -18,9 +18,16 @@ import numba
 import numpy as np
 
 from trajopt.arrays import Array, IntArray
-from trajopt.objectives.compiled import MAX_INCREMENT, STRICT
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
-from trajopt.objectives.swarm import LANES, Goal, step_travel, terminal_costs, turned
+from trajopt.objectives.swarm import (
+    LANES,
+    MAX_INCREMENT,
+    STRICT,
+    Goal,
+    step_travel,
+    terminal_costs,
+    turned,
+)
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
 
 # Rows of a block's state, each LANES long: what a candidate gives, the rotations, sums, and last
@@ -205,7 +212,7 @@ class HeadingSwarm:
             candidates[:, p] if p >= 0 else self.fixed[4 + k]
             for k, p in enumerate(self.places[4:6])
         )
-        steepest = np.max(np.abs([h1 - self.ends[0], h2 - h1, self.ends[1] - h2]))
+        steepest = np.max(np.abs([h1 - self.ends[0], h2 - h1, self.ends[1] - h2]), initial=0.0)
         return bool(
             3.0 * steepest * self.width < MAX_INCREMENT
         )  # a natural cubic: at most 3 times its chord's slope

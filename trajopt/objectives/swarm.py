@@ -16,10 +16,15 @@ import numba
 import numpy as np
 
 from trajopt.arrays import Array, IntArray
-from trajopt.objectives.compiled import C2, C4, C6, C8, C10, S3, S5, S7, S9, STRICT
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
 
+S3, S5, S7, S9 = -1 / 6, 1 / 120, -1 / 5040, 1 / 362880  # Taylor coefficients of the sine
+C2, C4, C6, C8, C10 = -1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800  # and of the cosine
+MAX_INCREMENT = 0.2  # rad; the first dropped term of the series is below 1e-17 there
+# Fast-math without reassociation, which would cancel (m + h) - (m - h) to 2 h and lose the digits
+# of short spans.
+STRICT = {"nsz", "contract"}
 LANES = (
     4  # candidates a block: one vector of doubles (AVX2); 8 and 16 measured slower, registers spill
 )
@@ -48,7 +53,7 @@ def step_travel(d, h, sat, dz, tiny):  # type: ignore[no-untyped-def]  # numba i
 
 @numba.njit(inline="always", fastmath=STRICT)
 def turned(c, s, a):  # type: ignore[no-untyped-def]  # numba infers
-    """(cos, sin) turned by the small angle a."""
+    """(cos, sin) turned by the angle a, exact to rounding up to MAX_INCREMENT."""
     q = a * a
     sin = a * (1.0 + q * (S3 + q * (S5 + q * (S7 + q * S9))))
     cos = 1.0 + q * (C2 + q * (C4 + q * (C6 + q * (C8 + q * C10))))

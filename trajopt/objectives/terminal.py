@@ -191,20 +191,18 @@ class TerminalObjective:
     # -----------------------------------------------------------------------------------------
 
     def predict(self, z: Any) -> Terminal:
-        """Final state on the search grid, for decision variables (d, n); compiled where that is
-        possible."""
-        points = self.control_points(z)
-        grid = step_grid(self.basis, self.steps)
-        if isinstance(z, np.ndarray) and not self.actuator.is_ideal and swarm_engine() == "numba":
-            from trajopt.objectives import compiled
+        """Final state on the search grid, for decision variables (d, n), arrays or symbols;
+        compiled where that is possible."""
+        if isinstance(z, np.ndarray) and self._compiled is not None and self._compiled[0].fits(z.T):
+            end = self._compiled[0].predict(z.T)
+            return Terminal(
+                end[0:1], end[1:2], end[2:3], tuple(end[i : i + 1] for i in range(3, 7))
+            )
+        return self.predict_readable(z)
 
-            if compiled.fits(grid, self.model, points.yaw):
-                end = compiled.roll_out_swarm(
-                    grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration
-                )
-                return Terminal(
-                    end[0:1], end[1:2], end[2:3], tuple(end[i : i + 1] for i in range(3, 7))
-                )
+    def predict_readable(self, z: Any) -> Terminal:
+        """The same by ``roll_out``: what the compiled prediction is tested against."""
+        points, grid = self.control_points(z), step_grid(self.basis, self.steps)
         return roll_out(
             grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration
         )
@@ -250,7 +248,7 @@ class TerminalObjective:
         return self.affine()
 
     @cached_property
-    def _prescribed(self) -> Any:
+    def _compiled(self) -> Any:
         """The compiled swarm (``objectives.swarm``, or ``heading_swarm`` where the heading is free)
         and what it compares with; None where it does not apply."""
         if (
@@ -295,14 +293,15 @@ class TerminalObjective:
                 fold(candidates @ matrix.T + offset, section.period)
             ).sum(axis=1)
             return Evaluation(cost, np.zeros(len(candidates)))
-        if self._prescribed is not None and self._prescribed[0].fits(candidates):
-            plan, goal = self._prescribed
+        if self._compiled is not None and self._compiled[0].fits(candidates):
+            plan, goal = self._compiled
             return Evaluation(plan.cost(candidates, goal), np.zeros(len(candidates)))
         return self.evaluate_readable(candidates)
 
     def evaluate_readable(self, candidates: Array) -> Evaluation:
         """The same from the named terms: what compiled and affine short cuts are tested against."""
-        terms = self.named_terms(self.predict(np.asarray(candidates, dtype=np.float64).T))
+        z = np.asarray(candidates, dtype=np.float64).T
+        terms = self.named_terms(self.predict_readable(z))
         cost = np.sum([np.broadcast_to(t, (1, len(candidates)))[0] for t in terms.values()], axis=0)
         return Evaluation(cost, np.zeros(len(candidates)))
 
@@ -398,6 +397,10 @@ class TerminalObjective:
     def coarse(self) -> TerminalObjective:
         """The same objective on a third of the grid, for Newton steps that are made exact
         afterwards."""
+        return self._coarse
+
+    @cached_property
+    def _coarse(self) -> TerminalObjective:
         return replace(self, steps=COARSE_STEPS)
 
     def effort(self, candidates: Array) -> Array:

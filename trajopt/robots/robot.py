@@ -16,14 +16,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.robots.description import RobotDescription, WheelSection
 from trajopt.robots.wheel import Row, Wheel, WheelKind
 from trajopt.schema import read_tables, set_key, validated
-
-Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
 DATA = Path(__file__).parent / "data"  # the shipped robots
