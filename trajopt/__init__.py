@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from trajopt.systems.smdw.problem import load_maneuver
     from trajopt.timing.scaling import time_scale
     from trajopt.timing.trajectory import State, Trajectory
-    from trajopt.world.terrain import Flat, Step
+    from trajopt.world.terrain import Flat
 
 __version__ = "0.1.0"
 
@@ -66,7 +66,6 @@ _HOME = {
     "SpeedZones": "trajopt.limits.speed_bound",
     "State": "trajopt.timing.trajectory",
     "Status": "trajopt.optimize.base",
-    "Step": "trajopt.world.terrain",
     "Tip": "trajopt.limits.tip",
     "Trajectory": "trajopt.timing.trajectory",
     "TrajoptError": "trajopt.errors",
@@ -109,7 +108,6 @@ __all__ = [
     "SpeedZones",
     "State",
     "Status",
-    "Step",
     "Tip",
     "Trajectory",
     "TrajoptError",

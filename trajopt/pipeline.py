@@ -186,7 +186,7 @@ def time_path(problem: PathProblem, *, engine: str = "auto") -> Trajectory:
         problem.spline,
         problem.as_limits(),
         robot=problem.platform,
-        terrain=problem.terrain,
+        ground=problem.terrain,
         engine=engine,
     )
 

@@ -81,7 +81,7 @@ def problem(number: int) -> PathProblem:
 def timed(task: PathProblem, variant: str, engine: str = "auto") -> Trajectory:
     """The path of a problem, timed."""
     limits = task.as_limits(variant="thesis" if variant == "thesis" else "physical")
-    return time_scale(task.spline, limits, robot=task.platform, terrain=task.terrain, engine=engine)
+    return time_scale(task.spline, limits, robot=task.platform, ground=task.terrain, engine=engine)
 
 
 def printed_linear() -> ResultTable:
@@ -215,7 +215,7 @@ def refinements(numbers: Sequence[int]) -> ResultTable:
             np.tile([-CORRIDOR, CORRIDOR], (count, 1)),
             task.as_limits(variant="physical"),
             robot=task.platform,
-            terrain=task.terrain,
+            ground=task.terrain,
             steps=6,
         )
         rows.append([*cells, f"{found.trajectory.duration:.2f}", f"{found.gain:.1%}"])
@@ -543,7 +543,7 @@ def physics(numbers: Sequence[int]) -> ResultTable:
     for number in numbers:
         task = problem(number)
         plan = time_scale(
-            task.spline, with_friction(task, RESERVE), robot=robot, terrain=task.terrain
+            task.spline, with_friction(task, RESERVE), robot=robot, ground=task.terrain
         )
         floor = Floor(task.friction, tuple(r.ramp for r in task.ramps))
         theirs = [m for m in measured if int(m["experiment"]) == number]

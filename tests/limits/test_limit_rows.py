@@ -139,6 +139,33 @@ def test_wheel_rows_are_the_derivatives_of_wheel_rates(path, robot):
     assert np.abs(here.twist[0] @ robot.inverse.T).max() * np.sqrt(top) == pytest.approx(10.0)
 
 
+@pytest.mark.parametrize("make", [WheelSpeed, WheelAcceleration])
+def test_one_number_a_wheel_binds_each_wheel_at_its_own(make):
+    """Equal numbers are one number; a wheel with half of it binds as half for all does there."""
+    robot, samples = loc8(), sample_path(CURVE, np.linspace(0, CURVE.length, 9))
+    one, same = (make(v).rows(samples, robot) for v in (4.0, (4.0,) * 4))
+    np.testing.assert_array_equal(one.sd2_max, same.sd2_max)
+    np.testing.assert_array_equal(one.a, same.a)
+    for i in range(4):
+        values = [np.inf] * 4
+        values[i] = 2.0
+        rows = make(tuple(values)).rows(samples, robot)
+        rates = np.abs(samples.twist @ robot.inverse[i])
+        if make is WheelSpeed:
+            np.testing.assert_allclose(rows.sd2_max, (2.0 / rates) ** 2)
+        else:
+            np.testing.assert_allclose(rows.a[:, i], samples.twist @ robot.inverse[i])
+            np.testing.assert_allclose(rows.b[:, 4 + i], -samples.twist_rate @ robot.inverse[i])
+            assert not rows.a[:, [j for j in range(8) if j % 4 != i]].any()
+            assert (rows.c == 2.0).all()
+    for wrong in ((1.0, 2.0), (1.0,) * 5):
+        with pytest.raises(ArgumentError, match="one a wheel"):
+            make(wrong).rows(samples, robot)
+    for wrong in ((), (1.0, 0.0, 1.0, 1.0), (np.inf,) * 4):
+        with pytest.raises(ArgumentError, match="> 0"):
+            make(wrong)
+
+
 def test_acceleration_is_the_rate_of_translational_speed():
     s0, u, x = 1.3, 0.6, 0.9
     h, s = motion(s0, u, x)

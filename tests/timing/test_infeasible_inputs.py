@@ -141,6 +141,6 @@ def test_slope_beyond_the_robots_grade():
     ramp = Ramp((2.0, 0.0), 0.0, 4.0, 0.9, 0.35)
     path = lay_over(Path.through([[0, 0], [8, 0]]), [ramp])
     with pytest.raises(InfeasibleError, match="grade") as caught:
-        time_scale(path, DRIVE, terrain=Ramps((ramp,), math.radians(8.53)))
+        time_scale(path, DRIVE, ground=Ramps((ramp,), math.radians(8.53)))
     assert 1.8 <= caught.value.place <= 6.3
-    time_scale(path, DRIVE, terrain=Ramps((ramp,), math.radians(15.0)))
+    time_scale(path, DRIVE, ground=Ramps((ramp,), math.radians(15.0)))

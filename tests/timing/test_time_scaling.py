@@ -21,7 +21,6 @@ from trajopt.limits.registry import LIMITS
 from trajopt.paths.path import Path
 from trajopt.robots.platform import STANDARD_GRAVITY
 from trajopt.timing.scaling import time_scale
-from trajopt.world.terrain import Step
 
 ENGINES = ("toppra", "compiled")
 KEPT = -1e-9
@@ -212,11 +211,6 @@ class TestInfeasible:
     def test_sideways_motion_of_a_differential_drive(self, engine):
         with pytest.raises(InfeasibleError, match="cannot roll"):
             time_scale(PATHS["sideways"], [limit("speed")], robot=ROBOTS["rear_cog"], engine=engine)
-
-    def test_step_in_the_way(self, engine):
-        self.expect(
-            "terrain", 1.2, self.straight, [limit("speed")], terrain=Step(0.1, 1.2), engine=engine
-        )
 
 
 def test_path_that_doubles_back_names_the_place():

@@ -108,6 +108,19 @@ def test_ends_are_the_path_ends_and_times_outside_are_refused():
             result.at(t)
 
 
+def test_wheel_angles_start_where_they_are_said_to():
+    start = [0.1, -0.2, 0.3, 0.4]
+    shifted = time_scale(PATHS["turning"], DRIVE, robot=ROBOTS["loc8"], start_wheels=start)
+    result = time_scale(PATHS["turning"], DRIVE, robot=ROBOTS["loc8"])
+    times = np.linspace(0.0, result.duration, 7)
+    np.testing.assert_allclose(
+        shifted.at(times).wheel_angles, result.at(times).wheel_angles + start, atol=1e-12
+    )
+    for wrong in ([0.1], [0.1, 0.2, 0.3, np.nan]):
+        with pytest.raises(ArgumentError, match="start_wheels"):
+            time_scale(PATHS["turning"], DRIVE, robot=ROBOTS["loc8"], start_wheels=wrong)
+
+
 def test_without_a_robot_there_are_no_wheels():
     result = time_scale(PATHS["slalom"], [limit("speed"), limit("acceleration")])
     assert result.at([0.0, 0.1]).wheel_speeds.shape == (2, 0)

@@ -74,7 +74,8 @@ def reference_of(trajectory: Trajectory, wheels: Array) -> Reference:
     times = np.linspace(0.0, trajectory.duration, SAMPLES)
     state = trajectory.at(times)
     s, _, _ = trajectory.along(times)
-    return Reference(times, s / trajectory.path.length, state.pose, wheels + state.wheel_angles)
+    turned = state.wheel_angles - trajectory.start_wheels
+    return Reference(times, s / trajectory.path.length, state.pose, wheels + turned)
 
 
 def eased(reference: Reference, stretch: float) -> Reference:

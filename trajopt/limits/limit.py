@@ -64,6 +64,25 @@ def speed_rows(name: str, rate: Array, largest: float) -> Rows:
     return Rows(name, empty, empty, empty, empty, sd2_max)
 
 
+def require_each_positive(argument: str, values: float | tuple[float, ...], unit: str) -> None:
+    """Raises ArgumentError unless every value is > 0, and one at least is finite."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim > 1 or not array.size or not (np.all(array > 0) and np.isfinite(array).any()):
+        raise ArgumentError(argument, values, f"finite values > 0 {unit}")
+
+
+def by_wheel(
+    argument: str, largest: float | tuple[float, ...], wheels: int
+) -> tuple[float, Array | float]:
+    """The least of the values and, for each wheel, that least as a share of its own value."""
+    values = np.asarray(largest, dtype=np.float64)
+    if values.ndim == 0:
+        return float(values), 1.0
+    if len(values) != wheels:
+        raise ArgumentError(argument, largest, f"one value, or {wheels}: one a wheel that rolls")
+    return float(values.min()), values.min() / values
+
+
 def require_robot(name: str, robot: Platform | None) -> Platform:
     """The robot, or ArgumentError: the limit ``name`` cannot be told without one."""
     if robot is None:

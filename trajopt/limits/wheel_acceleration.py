@@ -1,4 +1,4 @@
-"""Acceleration of every driven wheel."""
+"""Acceleration of every wheel."""
 
 from __future__ import annotations
 
@@ -6,29 +6,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.arrays import require_positive
-from trajopt.limits.limit import Rows, linear_rows, require_robot
+from trajopt.limits.limit import (
+    Rows,
+    by_wheel,
+    linear_rows,
+    require_each_positive,
+    require_robot,
+)
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
 
 
 @dataclass(frozen=True)
 class WheelAcceleration:
-    """|angular acceleration| <= ``largest``, rad/s^2, on every driven wheel.
+    """|angular acceleration| <= ``largest``, rad/s^2, of every wheel; one number, or one a wheel
+    (W,), inf where a wheel has no limit.
 
     Wheel rates are inverse @ twist s', so their derivative is inverse @ (twist s'' + twist_rate
     s'^2): for two fixed wheels at +-b, |(1 +- b kappa) s'' +- b kappa' s'^2| <= r largest. Two rows
-    a wheel. Raises ArgumentError unless ``largest`` > 0, or when there is no robot.
+    a wheel. Raises ArgumentError unless ``largest`` > 0, when there is no robot, or for another
+    number of values than wheels.
     """
 
-    largest: float  # rad/s^2
+    largest: float | tuple[float, ...]  # rad/s^2
     name: str = "wheel_acceleration"
 
     def __post_init__(self) -> None:
-        require_positive(f"{self.name}.largest", self.largest, "rad/s^2")
+        require_each_positive(f"{self.name}.largest", self.largest, "rad/s^2")
 
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
         inverse = require_robot(self.name, robot).inverse
-        a, b = path.twist @ inverse.T, path.twist_rate @ inverse.T
+        least, shares = by_wheel(f"{self.name}.largest", self.largest, len(inverse))
+        a, b = path.twist @ inverse.T * shares, path.twist_rate @ inverse.T * shares
         a, b = np.hstack([a, -a]), np.hstack([b, -b])
-        return linear_rows(self.name, a, b, np.full_like(a, self.largest), self.largest)
+        return linear_rows(self.name, a, b, np.full_like(a, least), least)

@@ -1,4 +1,4 @@
-"""Speed of every driven wheel."""
+"""Speed of every wheel."""
 
 from __future__ import annotations
 
@@ -6,26 +6,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.arrays import require_positive
-from trajopt.limits.limit import Rows, require_robot, speed_rows
+from trajopt.limits.limit import (
+    Rows,
+    by_wheel,
+    require_each_positive,
+    require_robot,
+    speed_rows,
+)
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.platform import Platform
 
 
 @dataclass(frozen=True)
 class WheelSpeed:
-    """|wheel rate| <= ``largest``, rad/s, on every driven wheel (rolling rows of lecture 003).
+    """|wheel rate| <= ``largest``, rad/s, of every wheel (rolling rows of lecture 003); one number,
+    or one a wheel (W,), inf where a wheel has no limit.
 
     For two fixed wheels at +-b it is s'^2 <= (r largest / (1 + b |kappa|))^2.
-    Raises ArgumentError unless ``largest`` > 0, or when there is no robot.
+    Raises ArgumentError unless ``largest`` > 0, when there is no robot, or for another number of
+    values than wheels.
     """
 
-    largest: float  # rad/s
+    largest: float | tuple[float, ...]  # rad/s
     name: str = "wheel_speed"
 
     def __post_init__(self) -> None:
-        require_positive(f"{self.name}.largest", self.largest, "rad/s")
+        require_each_positive(f"{self.name}.largest", self.largest, "rad/s")
 
     def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
-        rates = path.twist @ require_robot(self.name, robot).inverse.T
-        return speed_rows(self.name, np.max(np.abs(rates), axis=1), self.largest)
+        inverse = require_robot(self.name, robot).inverse
+        least, shares = by_wheel(f"{self.name}.largest", self.largest, len(inverse))
+        rates = np.abs(path.twist @ inverse.T) * shares
+        return speed_rows(self.name, np.max(rates, axis=1), least)

@@ -89,7 +89,7 @@ def optimize_path(
     limits: Callable[[Path], Sequence[Limit]] | Sequence[Limit],
     *,
     robot: Platform | None = None,
-    terrain: Terrain | None = None,
+    ground: Terrain | None = None,
     trust: float = 0.3,
     steps: int = 12,
 ) -> JointResult:
@@ -111,7 +111,7 @@ def optimize_path(
 
     def timed(at: Array) -> Trajectory:
         path = build(at)
-        return time_scale(path, used(path), robot=robot, terrain=terrain)
+        return time_scale(path, used(path), robot=robot, ground=ground)
 
     best = timed(z)
     first, history, radius = best.duration, [best.duration], trust

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
@@ -56,9 +57,10 @@ def follow(
     limits: Sequence[Limit],
     *,
     robot: Platform | None = None,
-    terrain: Terrain | None = None,
+    ground: Terrain | None = None,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
+    start_wheels: ArrayLike = (),
     manner: Literal["below", "least_squares"] = "below",
 ) -> Followed:
     """The motion closest to ``profile`` (s' over s) within ``limits``.
@@ -74,21 +76,23 @@ def follow(
             path,
             [*limits, profile],
             robot=robot,
-            terrain=terrain,
+            ground=ground,
             start_speed=start_speed,
             end_speed=end_speed,
+            start_wheels=start_wheels,
         )
         return Followed(found, np.interp(found.s, profile.places, profile.speeds))
     warm = time_scale(
         path,
         [*limits, profile],
         robot=robot,
-        terrain=terrain,
+        ground=ground,
         start_speed=start_speed,
         end_speed=end_speed,
+        start_wheels=start_wheels,
     )
     return _least_squares(
-        path, profile, tuple(limits), robot, Flat() if terrain is None else terrain, warm
+        path, profile, tuple(limits), robot, Flat() if ground is None else ground, warm
     )
 
 
@@ -98,7 +102,7 @@ def _least_squares(
     profile: SpeedProfile,
     limits: tuple[Limit, ...],
     robot: Platform | None,
-    terrain: Terrain,
+    ground: Terrain,
     warm: Trajectory,
 ) -> Followed:
     places = np.unique(
@@ -152,12 +156,13 @@ def _least_squares(
         path,
         limits,
         robot,
-        terrain,
+        ground,
         fine.u,
         fine.s,
         np.sqrt(sd2),
         np.diff(sd2) / (2 * step),
         "least_squares",
         float(np.sqrt(factor)),
+        warm.start_wheels,
     )
     return Followed(found, wanted)

@@ -316,9 +316,9 @@ def _terminal(objective: TerminalObjective | DurationObjective) -> TerminalObjec
 def _timing_table(trajectory: Trajectory) -> pd.DataFrame:
     """Gridpoints of the speed profile; s'' belongs to the interval after a gridpoint, so the last
     has none."""
-    if not isinstance(trajectory.terrain, Flat):
+    if not isinstance(trajectory.ground, Flat):
         raise ArgumentError(
-            "trajectory.terrain", trajectory.terrain, "flat ground: the folder keeps no other"
+            "trajectory.ground", trajectory.ground, "flat ground: the folder keeps no other"
         )
     return _frame(
         {

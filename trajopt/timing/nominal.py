@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajopt.arrays import require_positive
 from trajopt.limits.limit import Limit
@@ -23,13 +24,14 @@ def nominal_timing(
     limits: Sequence[Limit],
     *,
     robot: Platform | None = None,
-    terrain: Terrain | None = None,
+    ground: Terrain | None = None,
+    start_wheels: ArrayLike = (),
 ) -> Trajectory:
     """Trajectory along ``path`` in ``duration`` s with the spline parameter uniform in time.
 
     Nothing is scaled: ``margins()`` of the result say by how much ``limits`` are kept or broken.
-    The motion neither starts nor ends at rest. Raises ArgumentError for a duration that is not
-    positive.
+    The motion neither starts nor ends at rest. ``start_wheels`` (W,): wheel angles at the start,
+    rad; () for zeros. Raises ArgumentError for a duration that is not positive.
     """
     require_positive("duration", duration, "s")
     u = initial_grid(path, None)
@@ -41,11 +43,12 @@ def nominal_timing(
         path,
         tuple(limits),
         robot,
-        terrain or Flat(),
+        ground or Flat(),
         u,
         s,
         np.sqrt(sd2),
         np.diff(sd2) / (2 * np.diff(s)),
         "nominal",
         1.0,
+        np.asarray(start_wheels, dtype=np.float64),
     )

@@ -48,11 +48,12 @@ class _Job:
     path: Path
     limits: tuple[Limit, ...]
     robot: Platform | None
-    terrain: Terrain
+    ground: Terrain
     start: float
     end: float
     stops: Array
     engine: str
+    start_wheels: Array
 
 
 def time_scale(
@@ -60,13 +61,14 @@ def time_scale(
     limits: Sequence[Limit],
     *,
     robot: Platform | None = None,
-    terrain: Terrain | None = None,
+    ground: Terrain | None = None,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     gridpoints: int | ArrayLike | None = None,
     engine: str = "auto",
     stops: ArrayLike = (),
     too_fast: Literal["refuse", "brake"] = "refuse",
+    start_wheels: ArrayLike = (),
 ) -> Trajectory:
     """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s',
     m/s).
@@ -82,7 +84,7 @@ def time_scale(
     ``start_speed`` can reach, as when a zone appears in front of a moving robot: "refuse" raises
     InfeasibleError, "brake" brakes into it as fast as the other limits allow (with 99.9 % of it);
     the trajectory's limits, and so its margins, then hold the bound that was raised to that
-    braking.
+    braking. ``start_wheels`` (W,): wheel angles at the start, rad; () for zeros.
 
     What is still broken between gridpoints is removed by slowing the whole motion, end speeds
     included, by at most 0.1 % (``Trajectory.slowdown``). Where standing still breaks a limit
@@ -92,7 +94,7 @@ def time_scale(
     Raises ArgumentError for bad arguments, InfeasibleError (limit and place) where no motion
     exists, and MissingDependencyError for "compiled" without numba.
     """
-    job = _job(path, limits, robot, terrain, (start_speed, end_speed), engine, stops)
+    job = _job(path, limits, robot, ground, (start_speed, end_speed), engine, stops, start_wheels)
     u = insert(path, initial_grid(path, gridpoints), job.stops)
     _require_drivable(job, u)
     if too_fast == "brake" and start_speed > 0:
@@ -146,7 +148,7 @@ def start_speeds(
     limits: Sequence[Limit],
     *,
     robot: Platform | None = None,
-    terrain: Terrain | None = None,
+    ground: Terrain | None = None,
     end_speed: float = 0.0,
     gridpoints: int | ArrayLike | None = None,
 ) -> tuple[float, float]:
@@ -155,7 +157,7 @@ def start_speeds(
 
     Raises as ``time_scale``.
     """
-    job = _job(path, limits, robot, terrain, (0.0, end_speed), "auto", ())
+    job = _job(path, limits, robot, ground, (0.0, end_speed), "auto", ())
     u = initial_grid(path, gridpoints)
     _require_drivable(job, u)
     _, stages = _with_edges(job, u, 0.0)
@@ -168,10 +170,11 @@ def _job(
     path: Path,
     limits: Sequence[Limit],
     robot: Platform | None,
-    terrain: Terrain | None,
+    ground: Terrain | None,
     speeds: tuple[float, float],
     engine: str,
     stops: ArrayLike,
+    start_wheels: ArrayLike = (),
 ) -> _Job:
     """The checked arguments. Raises ArgumentError."""
     if not isinstance(path, Path):
@@ -183,8 +186,8 @@ def _job(
             raise ArgumentError("limits", limit, "limits, as Speed(1.0)")
     if robot is not None and not isinstance(robot, Platform):
         raise ArgumentError("robot", robot, "a Platform, as loc8(), or None")
-    if terrain is not None and not hasattr(terrain, "check"):
-        raise ArgumentError("terrain", terrain, "a terrain, as Flat(), or None")
+    if ground is not None and not hasattr(ground, "check"):
+        raise ArgumentError("ground", ground, "the shape of the ground, as Flat(), or None")
     names = [limit.name for limit in limits]
     if len(set(names)) < len(names):
         raise ArgumentError("limits", names, "limits with different names (pass name=...)")
@@ -201,9 +204,11 @@ def _job(
             (*speeds, *places),
             "0 and none: linear scaling takes the path's own speeds",
         )
-    ground = Flat() if terrain is None else terrain
-    ground.check(path)
-    return _Job(path, tuple(limits), robot, ground, speeds[0] ** 2, speeds[1] ** 2, places, engine)
+    shape = Flat() if ground is None else ground
+    shape.check(path)
+    wheels = np.asarray(start_wheels, dtype=np.float64)
+    squares = speeds[0] ** 2, speeds[1] ** 2
+    return _Job(path, tuple(limits), robot, shape, *squares, places, engine, wheels)
 
 
 def _require_drivable(job: _Job, u: Array) -> None:
@@ -288,13 +293,14 @@ def _trajectory(job: _Job, fine: FineRows, sd2: Array, factor: float, engine: st
         job.path,
         job.limits,
         job.robot,
-        job.terrain,
+        job.ground,
         fine.u,
         fine.s,
         np.sqrt(sd2),
         np.diff(sd2) / (2 * np.diff(fine.s)),
         engine,
         float(np.sqrt(factor)),
+        job.start_wheels,
     )
 
 

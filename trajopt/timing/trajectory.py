@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
@@ -40,7 +40,7 @@ class State:
 
     pose: Array  # (N, 3) m, m, rad (yaw continuous along the path)
     twist: Array  # (N, 3) m/s, m/s, rad/s
-    wheel_angles: Array  # (N, W) rad, from 0 at the start; W = 0 without a robot
+    wheel_angles: Array  # (N, W) rad, from the trajectory's start_wheels; W = 0 without a robot
     wheel_speeds: Array  # (N, W) rad/s
 
 
@@ -56,13 +56,22 @@ class Trajectory:
     path: Path
     limits: tuple[Limit, ...]
     robot: Platform | None
-    terrain: Terrain
+    ground: Terrain
     u: Array  # (N+1,) spline parameter at the gridpoints
     s: Array  # (N+1,) path parameter at the gridpoints, m
     sd: Array  # (N+1,) path speed, m/s
     sdd: Array  # (N,) path acceleration after each gridpoint, m/s^2
     engine: str
     slowdown: float
+    start_wheels: Array = field(default_factory=lambda: np.zeros(0))  # (W,) rad; () means zeros
+
+    def __post_init__(self) -> None:
+        count = 0 if self.robot is None else len(self.robot.wheels)
+        wheels = self.start_wheels if np.size(self.start_wheels) else np.zeros(count)
+        if np.shape(wheels) != (count,) or not np.all(np.isfinite(wheels)):
+            expected = f"{count} finite angles, one a wheel that rolls, rad"
+            raise ArgumentError("start_wheels", np.asarray(wheels).tolist(), expected)
+        object.__setattr__(self, "start_wheels", wheels)
 
     @cached_property
     def times(self) -> Array:
@@ -102,7 +111,8 @@ class Trajectory:
         if self.robot is None or self._wheels is None:
             none = np.zeros((len(s), 0))
             return State(pose, twist, none, none)
-        return State(pose, twist, self._wheels.at(u), twist @ self.robot.inverse.T)
+        angles = self.start_wheels + self._wheels.at(u)
+        return State(pose, twist, angles, twist @ self.robot.inverse.T)
 
     def margins(self) -> Mapping[str, float]:
         """Least relative margin of every limit, recomputed on a grid ten times finer than the

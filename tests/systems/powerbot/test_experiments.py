@@ -117,7 +117,7 @@ def test_time_optimal_beats_linear(number: int, ratio: float) -> None:
             task.spline,
             task.as_limits(variant="thesis"),
             robot=task.platform,
-            terrain=task.terrain,
+            ground=task.terrain,
             engine=engine,
         )
         for engine in ("linear", "auto")
@@ -145,7 +145,7 @@ def test_slope_beyond_the_grade_is_refused() -> None:
         ramps=[{"foot": [-44.63, -30.4], "direction": -1.588, "length": 4.29, "height": 0.9}]
     )
     with pytest.raises(InfeasibleError, match="grade"):
-        time_scale(task.spline, task.as_limits(), robot=task.platform, terrain=task.terrain)
+        time_scale(task.spline, task.as_limits(), robot=task.platform, ground=task.terrain)
 
 
 def test_ramp_keeps_the_curve_in_the_plane() -> None:
