@@ -5,16 +5,15 @@ from __future__ import annotations
 
 import csv
 import datetime
-import importlib.metadata
 import os
-import platform
-import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+
+from trajopt.provenance import commit, processor, versions
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "benchmarks"
@@ -30,59 +29,13 @@ class ResultTable:
     rows: Sequence[Sequence[str]]
 
 
-def cpu() -> str:
-    """Model name of the processor and how many cores this process may use."""
-    name = platform.processor() or platform.machine()
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        name = next(
-            (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), name
-        )
-    except OSError:
-        pass
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return f"{name}, {cores} cores"
-
-
-def commit() -> str:
-    """Commit of the checkout, "+" when it has changes; "unknown" outside git."""
-    try:
-        head = subprocess.run(
-            ["git", "rev-parse", "--short", "HEAD"],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=10,
-        ).stdout.strip()
-        changed = subprocess.run(
-            ["git", "status", "--porcelain", "--untracked-files=no"],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=10,
-        ).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"
-    return head + ("+" if changed else "")
-
-
-def versions(packages: Sequence[str]) -> str:
-    """Versions of Python and of the packages that are installed."""
-    found = [f"Python {platform.python_version()}"]
-    for name in packages:
-        try:
-            found.append(f"{name} {importlib.metadata.version(name)}")
-        except importlib.metadata.PackageNotFoundError:
-            found.append(f"{name} not installed")
-    return ", ".join(found)
-
-
 def provenance(packages: Sequence[str]) -> str:
-    """One line: date, commit, CPU, versions."""
+    """One line: date, commit ("+" behind it where files differ), CPU, versions."""
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return f"{now}; commit {commit()}; {cpu()}; {versions(packages)}"
+    head, _, changed = (commit() or "unknown").partition("+")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    found = ", ".join(f"{name} {version}" for name, version in versions(packages).items())
+    return f"{now}; commit {head[:7]}{'+' * bool(changed)}; {processor()}, {cores} cores; {found}"
 
 
 def publish(

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import argparse
 import csv
-import importlib.metadata
 import itertools
 import math
-import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +20,7 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
+from benchmarks.common import provenance
 from trajopt.simulate.engine import ENGINES, Command, Recording, SimRobot, make_engine
 from trajopt.simulate.rollers import SHAPES, Shape
 from trajopt.simulate.scene import Scene
@@ -156,46 +155,18 @@ def summary(rows: Sequence[Row]) -> list[tuple[str, ...]]:
     return lines
 
 
-def conditions() -> list[str]:
-    """Versions and machine, one line each."""
-    names = ("trajopt", "pybullet", "mujoco", "numpy")
-    return [
-        *(f"{name} {_version(name)}" for name in names),
-        f"Python {platform.python_version()}",
-        _cpu(),
-    ]
-
-
-def _version(name: str) -> str:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"
-
-
-def _cpu() -> str:
-    info = Path("/proc/cpuinfo")
-    lines = info.read_text(encoding="utf-8").splitlines() if info.exists() else []
-    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return (
-        f"{models[0]}, {len(models)} cores"
-        if models
-        else platform.processor() or platform.machine()
-    )
-
-
-def write(rows: Sequence[Row], folder: Path) -> None:
+def write(rows: Sequence[Row], conditions: str, folder: Path) -> None:
     """``rollers.csv`` and ``rollers.md`` in ``folder``."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "rollers.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow((*HEADER, "conditions"))
-        writer.writerows((*cells(row), "; ".join(conditions())) for row in rows)
+        writer.writerows((*cells(row), conditions) for row in rows)
     lines = [
         "# Roller shapes in the simulators",
         "",
         f"LOC8 over {DISTANCE:g} m, friction {Scene().friction:g}. Spheres are the package's default. Real-time "
-        "factors are of wall time: other load lowers them. " + "; ".join(conditions()),
+        "factors are of wall time: other load lowers them. " + conditions,
         "",
     ]
     for title, header, body in (
@@ -207,13 +178,13 @@ def write(rows: Sequence[Row], folder: Path) -> None:
     (folder / "rollers.md").write_text("\n".join(lines), encoding="utf-8")
 
 
-def show(rows: Sequence[Row], console: Console) -> None:
+def show(rows: Sequence[Row], conditions: str, console: Console) -> None:
     """Both tables on the terminal."""
     for title, header, body in (
         ("Roller shapes, all runs", HEADER, [cells(row) for row in rows]),
         ("Worst over motions and speeds", SUMMARY_HEADER, summary(rows)),
     ):
-        table = Table(*header, title=title, caption="; ".join(conditions()))
+        table = Table(*header, title=title, caption=conditions)
         for line in body:
             table.add_row(*line)
         console.print(table)
@@ -235,8 +206,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console = Console()
     todo = cases(QUICK_SPEEDS if chosen.quick else SPEEDS, chosen.engine or ENGINES)
     rows = [measure(case) for case in track(todo, description="driving", console=console)]
-    show(rows, console)
-    write(rows, chosen.out)
+    conditions = provenance(("pybullet", "mujoco", "numpy"))
+    show(rows, conditions, console)
+    write(rows, conditions, chosen.out)
     console.print(f"written: {chosen.out / 'rollers.md'} and rollers.csv")
 
 

@@ -21,8 +21,8 @@ from trajopt.errors import ArgumentError, MissingDependencyError, ProblemError
 from trajopt.optimize.search import optimizer_names
 from trajopt.pipeline import Solution
 from trajopt.problem.search import WHEELS
+from trajopt.provenance import commit, versions
 from trajopt.report.files import as_toml, finite
-from trajopt.report.provenance import commit, versions
 from trajopt.report.run_folder import (
     binding_at,
     binding_shares,

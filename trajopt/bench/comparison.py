@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import datetime
 import json
-import platform
 import time
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
@@ -33,6 +32,7 @@ from trajopt.errors import ArgumentError
 from trajopt.optimize.base import FEASIBLE, Budget, Optimizer, OptimizeResult
 from trajopt.optimize.plugins import optimizers_of_file
 from trajopt.optimize.search import minimize, optimizer_named
+from trajopt.provenance import processor
 from trajopt.sweeps.cases import Case
 from trajopt.sweeps.drive import Progress
 from trajopt.sweeps.store import Store
@@ -227,7 +227,7 @@ class BenchRun:
             "reference": problem.reference,
             "best": problem.best,
             "found_by": problem.found_by,
-            "cpu": _cpu(),
+            "cpu": processor(),
             "x": json.dumps(found.x.tolist()),
             **_history(problem, found),
         }
@@ -279,17 +279,6 @@ def _history(problem: BenchProblem, found: OptimizeResult) -> dict[str, Any]:
         "at_seconds": seconds[keep].tolist(),
         "at_cost": cost[keep].tolist(),
     }
-
-
-def _cpu() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    return next(
-        (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")),
-        platform.processor() or platform.machine(),
-    )
 
 
 def run_bench(

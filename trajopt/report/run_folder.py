@@ -24,8 +24,8 @@ from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
 from trajopt.pipeline import Solution
 from trajopt.problem.search import WHEELS, Problem, load_problem
+from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import as_toml, made_folder, read_json, write_json, write_text
-from trajopt.report.provenance import commit, run_facts, versions
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.terrain import Flat
 

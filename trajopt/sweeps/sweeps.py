@@ -7,13 +7,11 @@ import json
 import os
 import platform
 import socket
-import subprocess
 import sys
 import time
 import uuid
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Executor
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +20,7 @@ import numpy as np
 import trajopt
 from trajopt.arrays import AnyArray, IntArray
 from trajopt.errors import ArgumentError
+from trajopt.provenance import commit, versions
 from trajopt.sweeps.cases import CaseTable, case_table, identity_base
 from trajopt.sweeps.drive import Drive, Progress, Setup
 from trajopt.sweeps.executors import Engine, engine_of
@@ -31,7 +30,6 @@ from trajopt.sweeps.runfunction import RunFunction, name_of, packed
 from trajopt.sweeps.store import Store, open_store
 
 TIME_LIMIT = 3600.0  # s a case may take where nothing else is said; chosen
-_PACKAGES = ("numpy", "scipy", "casadi", "pyarrow", "numba", "mujoco", "pybullet", "distributed")
 
 
 def sweep(
@@ -178,10 +176,9 @@ def record_run(
             "host": socket.gethostname(),
             "pid": os.getpid(),
             "command": sys.argv,
-            "python": platform.python_version(),
             "platform": platform.platform(),
-            "versions": _versions(),
-            "commit": _commit(),
+            "versions": versions(),
+            "commit": commit(),
             "sweep": source,
         },
     )
@@ -204,39 +201,3 @@ def close_record(store: Store, run_id: str, state: str, counts: Mapping[str, int
 
 def _write_record(store: Store, run_id: str, entry: Mapping[str, Any]) -> None:
     store.write_text(f"runs/{run_id}.json", json.dumps(entry, indent=2) + "\n")
-
-
-def _versions() -> dict[str, str]:
-    found = {"trajopt": trajopt.__version__}
-    for name in _PACKAGES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
-
-
-def _commit() -> str | None:
-    """Commit of the code, where it runs from a git checkout; with "+changes" where that is not
-    clean."""
-    folder = Path(trajopt.__file__).parent
-    try:
-        told = subprocess.run(
-            [
-                "git",
-                "-C",
-                str(folder),
-                "describe",
-                "--always",
-                "--dirty=+changes",
-                "--abbrev=40",
-                "--exclude=*",
-            ],
-            capture_output=True,
-            text=True,
-            timeout=10,
-            check=True,
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return told.stdout.strip() or None
