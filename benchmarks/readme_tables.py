@@ -14,7 +14,7 @@ import pandas as pd
 
 from benchmarks.theses.climb import SOURCES, THESIS
 from benchmarks.theses.closed_loop import SETTINGS
-from trajopt.systems.smdw.climb import wilson
+from trajopt.report.intervals import wilson
 
 README, RESULTS, WHOLE = Path("README.md"), Path("out/benchmarks"), Path("docs/optimizers.md")
 START, END = "<!-- tables: python -m benchmarks.readme_tables -->", "<!-- end of tables -->"

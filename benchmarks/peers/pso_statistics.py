@@ -16,8 +16,9 @@ from functools import partial
 import numpy as np
 
 from benchmarks.common import ResultTable, publish
+from trajopt.bench.functions import CLASSICAL
 from trajopt.bench.peers import equal_pyswarms
-from trajopt.bench.problems import CLASSICAL, objective_named
+from trajopt.bench.problems import objective_named
 from trajopt.bench.profiles import holm, no_worse
 from trajopt.optimize.base import Budget, Optimizer
 from trajopt.optimize.pso import constriction

@@ -21,8 +21,8 @@ import numpy as np
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from trajopt.control.approach import Mode, Sensors, approach_controller
+from trajopt.report.intervals import wilson
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
-from trajopt.systems.smdw.climb import wilson
 from trajopt.systems.smdw.planner import Plan, configurations, plan_configuration
 from trajopt.systems.smdw.problem import load_maneuver
 from trajopt.systems.smdw.trials import four, step_scene

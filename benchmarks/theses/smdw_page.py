@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from benchmarks.common import OUT, ResultTable, markdown
 from benchmarks.theses.smdw_figures import SOURCE_NAMES, phase_shares
-from trajopt.systems.smdw.climb import wilson
+from trajopt.report.intervals import wilson
 from trajopt.systems.smdw.trial_pictures import ClimbCell
 
 CLIMBS = 0.5  # share of its runs from which a phase counts as one that climbs, chosen

@@ -20,9 +20,10 @@ import numpy as np
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from benchmarks.theses.climb import NAMES, THESIS
+from trajopt.report.intervals import wilson
 from trajopt.robots.loc8 import HALF_TRACK, HALF_WHEELBASE
 from trajopt.simulate.engine import ENGINES, Recording
-from trajopt.systems.smdw.climb import Climb, Outcome, judge, record_climb, wilson
+from trajopt.systems.smdw.climb import Climb, Outcome, judge, record_climb
 from trajopt.systems.smdw.planner import Configuration, configurations
 from trajopt.systems.smdw.problem import ManeuverProblem, load_maneuver
 from trajopt.systems.smdw.trials import critical_wheels, four, step_scene

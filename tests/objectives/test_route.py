@@ -8,10 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trajopt.bench.route_problems import LENGTH, RADIUS, WALLS, moved_knots, random_corridor
 from trajopt.objectives.route import RESERVE, Corridor, RouteObjective
 from trajopt.optimize.base import Budget
 from trajopt.optimize.search import minimize
+from trajopt.systems.powerbot.bench_problems import (
+    LENGTH,
+    RADIUS,
+    WALLS,
+    moved_knots,
+    random_corridor,
+)
 
 EXPERIMENT = Path(__file__).parents[2] / "problems" / "powerbot" / "experiment_1.toml"
 

@@ -24,6 +24,11 @@ def cheap(case: Case) -> dict[str, Any]:
     return {"square": x * x, "draw": float(case.rng().random()), "even": int(x) % 2 == 0}
 
 
+def friction(case: Case, problem: Any) -> float:
+    """What the problem of this case has, times a value that only this function knows."""
+    return float(problem.limits.friction) * float(case["factor"])
+
+
 def paced(case: Case) -> dict[str, Any]:
     """``cheap``, 5 ms long."""
     time.sleep(0.005)

@@ -15,7 +15,8 @@ from trajopt.errors import ArgumentError, ProblemError
 from trajopt.sweeps.axes import axis_values, combined, with_derived
 from trajopt.sweeps.cases import case_table, identity_base
 from trajopt.sweeps.expressions import evaluate, parse
-from trajopt.sweeps.sweepfile import load_sweep
+from trajopt.sweeps.runfunction import name_of, packed, unpacked
+from trajopt.sweeps.sweepfile import RUN_CASE, load_sweep
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -227,6 +228,10 @@ def sweep_file(folder: Path, text: str) -> Path:
         ("[axes.height]\nvalues = [1.0]", "height"),
         ('[axes."limits.friction"]\nvalues = [-1.0]', "greater than 0"),
         ('[axes."run.optimiser"]\nvalues = ["pso"]', "run.optimizer"),
+        ('[axes."run.seed"]\nvalues = [0.5, 1.0]', "run.seed = 0.5"),
+        ('solve.engine = "bullet"', "run.engine = 'bullet': expected one of none, pybullet"),
+        ("solve.evaluation = 9", "run.evaluation = 9: expected one of run.optimizer"),
+        ('solve.engine = "none"\n[axes."run.engine"]\nvalues = ["none"]', "each name once"),
         ('exclude = ["x >"]\n[axes."limits.friction"]\nvalues = [1.0]', "x >"),
         (
             'exclude = ["limits.friction > 0"]\n[axes."limits.friction"]\nvalues = [1.0]',
@@ -244,3 +249,55 @@ def test_problem_changes_identity(tmp_path: Path) -> None:
     one = load_sweep(sweep_file(tmp_path, text)).table.ids
     two = load_sweep(sweep_file(tmp_path, text + "[solve]\noptimizer = 'pso'\n")).table.ids
     assert not set(one.tolist()) & set(two.tolist())
+
+
+def test_solve_is_short_for_an_axis_of_one_value(tmp_path: Path) -> None:
+    axis = '[axes."limits.friction"]\nvalues = [0.3, 0.4]\n'
+    short = load_sweep(sweep_file(tmp_path, axis + "[solve]\nevaluations = 7\n")).table
+    long = axis + '[axes."run.evaluations"]\nvalues = [7]\n'
+    assert set(short.ids.tolist()) == set(load_sweep(sweep_file(tmp_path, long)).table.ids.tolist())
+    assert [c["run.evaluations"] for c in short.rows()] == [7, 7]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[axes.x]\nvalues = [1]", "problem"),
+        (f'run = "{RUN_CASE}"\n[axes.x]\nvalues = [1]', "problem"),
+        ('run = "tests.sweeps.run_functions"\n[axes.x]\nvalues = [1]', "module:function"),
+        ('run = "tests.sweeps.run_functions:nothing"\n[axes.x]\nvalues = [1]', "nothing"),
+        (
+            'run = "tests.sweeps.run_functions:cheap"\nsolve.seed = 1\n[axes.x]\nvalues = [1]',
+            "no such table",
+        ),
+        (f'problem = "{ROOT}/problems/smdw/step_5cm.toml"\n[axes.repeat]\nvalues = [1]', "run"),
+        (
+            f'problem = "{ROOT}/problems/smdw/step_5cm.toml"\n'
+            'run = "tests.sweeps.run_functions:friction"\n[axes."run.seed"]\nvalues = [1]',
+            "a name without a dot",
+        ),
+    ],
+)
+def test_wrong_run_functions_are_told(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "sweep.toml").write_text(text)
+    with pytest.raises(ProblemError, match=words):
+        load_sweep(tmp_path / "sweep.toml")
+
+
+@pytest.mark.parametrize(
+    ("file", "key"),
+    [
+        ("smdw/scenario_1_lateral", "limits.friction"),
+        ("smdw/step_5cm", "limits.friction"),
+        ("powerbot/experiment_1", "limits.friction"),
+    ],
+)
+def test_a_function_gets_the_problem_of_its_case(tmp_path: Path, file: str, key: str) -> None:
+    (tmp_path / "sweep.toml").write_text(
+        f'problem = "{ROOT}/problems/{file}.toml"\nrun = "tests.sweeps.run_functions:friction"\n'
+        f'[axes."{key}"]\nvalues = [0.25, 0.5]\n[axes.factor]\nvalues = [2.0]\n'
+    )
+    plan = load_sweep(tmp_path / "sweep.toml")
+    assert [plan.run(case) for case in plan.table.rows()] == [0.5, 1.0]
+    assert name_of(plan.run) == "tests.sweeps.run_functions:friction"
+    assert name_of(unpacked(packed(plan.run))) == name_of(plan.run)

@@ -37,7 +37,7 @@ def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPa
 
 def test_all_configurations_of_the_study_are_there_and_others_are_named() -> None:
     plan = load_sweep(ROOT / "problems" / "sweeps" / "climb_rate.toml")
-    problem = plan.run.problem  # type: ignore[attr-defined]  # run is a ProblemRun here
+    problem = plan.run.problem  # type: ignore[attr-defined]
     wanted = {row["configuration"] for row in plan.table.rows()}
     for height in {row["obstacle.height"] for row in plan.table.rows()}:
         step = problem.replace({"obstacle.height": height}).obstacle

@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 
 from trajopt.errors import ArgumentError
+from trajopt.report.intervals import wilson
 from trajopt.report.sweeps import heat_map, lines, pairs
-from trajopt.systems.smdw.climb import wilson
 from trajopt.systems.smdw.rate_pictures import rate_lines, rate_maps
 
 

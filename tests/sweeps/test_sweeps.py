@@ -23,6 +23,7 @@ from tests.sweeps.crashes import ROOT, cases, digest, torment
 from tests.sweeps.run_functions import cheap, mixed, noop, paced, poisoned
 from tests.sweeps.same_table import swept
 from trajopt.errors import ArgumentError
+from trajopt.provenance import commit, versions
 from trajopt.sweeps.cases import Case
 from trajopt.sweeps.child import PROGRESS, note_progress, noted_progress
 from trajopt.sweeps.drive import Progress, WorkerStartError
@@ -142,6 +143,9 @@ def test_rerunning_does_only_what_is_missing(tmp_path: Path) -> None:
     assert seen[-1].total == seen[-1].finished == 5
     assert len(store.frame()) == 25
     assert [r["state"] for r in store.runs()] == ["finished"] * 3
+    record = store.runs()[-1]
+    assert (record["versions"], record["commit"]) == (versions(), commit())
+    assert record["function"] == "tests.sweeps.run_functions:cheap"
 
 
 class Flag:

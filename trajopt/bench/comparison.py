@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
+from trajopt.bench.functions import more_wild_names
 from trajopt.bench.problems import (
     BenchProblem,
     bench_problem,
     best_known,
-    more_wild_names,
     objective_named,
 )
 from trajopt.errors import ArgumentError

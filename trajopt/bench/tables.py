@@ -13,6 +13,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.bench.comparison import TARGETS, best_costs
+from trajopt.bench.problems import families
 from trajopt.bench.profiles import RunningTime, expected_running_time, no_worse, time_to_targets
 from trajopt.errors import ArgumentError
 
@@ -22,18 +23,6 @@ Unit = Literal["evaluations", "evaluations and gradients", "seconds"]
 SOLVED = 1e-6  # share of reference - best left at which a problem counts as solved; chosen
 NEAR = 1e-2  # the same for nearly solved; chosen
 GRADIENT_METHODS = ("ipopt", "slsqp", "l-bfgs-b", "trust-constr", "least-squares")
-FAMILIES = {  # name in the report -> what the names of its problems look like
-    "SMDW, ideal drives (affine)": r"smdw/[^/]+/[^/]+",
-    "SMDW, limits, points free": r"smdw/[^/]+/(p1|p2|p1\+p2)/limits",
-    "SMDW, limits, points and headings free": r"smdw/[^/]+/.*heading/limits",
-    "random SMDW goals, limits": r"random-smdw/.*",
-    "corridor, least length": r"corridor/\d+/length",
-    "corridor, least time under slip": r"corridor/\d+/duration",
-    "thesis 004 path, least time": r"powerbot/.*",
-    "ASOC design, constrained": r"asoc/.*",
-    "classical, 10-D": r"classical/.*",
-    "Moré-Wild least squares": r"more-wild/.*",
-}
 
 
 class Share(NamedTuple):
@@ -86,9 +75,10 @@ class BenchTables:
     def families(self) -> dict[str, list[int]]:
         """Positions of the problems of each family; what fits none is listed under its first
         word."""
-        found: dict[str, list[int]] = {name: [] for name in FAMILIES}
+        labels = {name: like for one in families().values() for name, like in one.labels.items()}
+        found: dict[str, list[int]] = {name: [] for name in labels}
         for i, problem in enumerate(self.problems):
-            for name, pattern in FAMILIES.items():
+            for name, pattern in labels.items():
                 if re.fullmatch(pattern, problem):
                     found[name].append(i)
                     break

@@ -12,13 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trajopt.arrays import Array
+from trajopt.case import ProblemRun, run_case, seed_of, solve_case
 from trajopt.errors import ArgumentError
 from trajopt.report.files import made_folder, write_json
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.run_folder import write_solution, write_validation
 from trajopt.report.style import in_style, legend_beside, new_figure, save_figure
 from trajopt.sweeps.cases import Case
-from trajopt.sweeps.problem_run import ProblemRun
 from trajopt.sweeps.rows import DONE
 
 if TYPE_CHECKING:
@@ -44,10 +44,10 @@ def report_case(
     row, arrays = store.case(prefix)
     place = made_folder(folder)
     files = []
-    if plan is not None and isinstance(plan.run, ProblemRun) and row["status"] == DONE:
-        files += _solved_again(plan.run, _case(plan, str(row["case"])), row, place)
-    elif plan is not None:
-        _case(plan, str(row["case"]))
+    if plan is not None:
+        case, run = _case(plan, str(row["case"])), plan.run
+        if isinstance(run, ProblemRun) and run.func is run_case and row["status"] == DONE:
+            files += _solved_again(run, case, row, place)
     write_json(
         place / "case.json",
         {
@@ -113,7 +113,7 @@ def _solved_again(
     run: ProblemRun, case: Case, row: Mapping[str, Any], place: FilePath
 ) -> list[FilePath]:
     """Run folder and pictures of a case that was solved."""
-    solution = run.solution(case)
+    solution, report = solve_case(case, run.changed(case))
     if not math.isclose(solution.cost, row["cost"], rel_tol=_SAME, abs_tol=_SAME):
         raise ArgumentError(
             "cost",
@@ -121,9 +121,8 @@ def _solved_again(
             f"{row['cost']!r}, as the case's row says; it was run by other "
             "code (see the store's runs/*.json)",
         )
-    write_solution(solution, place, seed=run.seed(case), command="trajopt report")
+    write_solution(solution, place, seed=seed_of(case), command="trajopt report")
     files = [place / "summary.json", *save_pictures(solution, place)]
-    report = run.driven(case, solution)
     if report is not None:
         write_validation(report, place)
         files += save_physics_picture(solution, report, place)

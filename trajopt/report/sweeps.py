@@ -12,8 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
+from trajopt.report.intervals import wilson
 from trajopt.sweeps.store import open_store
-from trajopt.systems.smdw.climb import wilson
 
 DOTS = 150  # dots per inch of saved pictures
 INTERVAL = (10.0, 90.0)  # percentiles between which a line's band lies; chosen

@@ -1,9 +1,10 @@
-"""A run function in a form that any process can load: pickled, with the module search path it
-needs."""
+"""A run function: found by name, and in a form that any process can load: pickled, with the module
+search path it needs."""
 
 from __future__ import annotations
 
 import hashlib
+import importlib
 import pickle
 import runpy
 import sys
@@ -12,9 +13,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from trajopt.errors import ArgumentError
+from trajopt.errors import ArgumentError, TrajoptError
 
 RunFunction = Callable[[Any], Any]  # Case -> mapping of names to results, a number, or None
+
+
+def function_named(key: str, name: str) -> Any:
+    """The function called "module:function". Raises ArgumentError, naming ``key``."""
+    module, sign, attribute = name.partition(":")
+    if not sign:
+        raise ArgumentError(key, name, "'module:function'")
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except TrajoptError:
+        raise
+    except (ImportError, AttributeError) as error:
+        raise ArgumentError(key, name, f"a function that can be imported ({error})") from None
+    if not callable(found):
+        raise ArgumentError(key, name, "a function")
+    return found
 
 
 @dataclass(frozen=True)
@@ -60,15 +77,15 @@ def unpacked(run: Packed) -> RunFunction:
 
 def name_of(run: RunFunction) -> str:
     """Name that goes into identities: module and qualified name, of the class for a callable
-    object."""
-    function = getattr(run, "func", run)  # functools.partial
+    object, of ``func`` where it has one, as ``functools.partial`` and bound functions do."""
+    function = getattr(run, "func", run)
     named = function if hasattr(function, "__qualname__") else type(function)
     module = _module_of(run)
     return f"{'__main__' if module == '__mp_main__' else module}:{named.__qualname__}"
 
 
 def _module_of(run: RunFunction) -> str:
-    function = getattr(run, "func", run)  # functools.partial
+    function = getattr(run, "func", run)
     return str(getattr(function, "__module__", None) or type(function).__module__)
 
 

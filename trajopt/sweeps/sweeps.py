@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-import trajopt
 from trajopt.arrays import AnyArray, IntArray
 from trajopt.errors import ArgumentError
 from trajopt.provenance import commit, versions
@@ -96,9 +95,8 @@ def tabled(cases: Any, run: RunFunction, code: str | None, problem: Any) -> Case
     """Table of cases with identities for this run function, code and problem."""
     if isinstance(cases, CaseTable):
         return cases
-    table = case_table(
-        cases, identity_base(name_of(run), problem, code or f"trajopt {trajopt.__version__}")
-    )
+    code = code or f"trajopt {versions(())['trajopt']}"
+    table = case_table(cases, identity_base(name_of(run), problem, code))
     reserved = sorted(set(table.columns) & set(FIXED_COLUMNS))
     if reserved:
         raise ArgumentError(

@@ -1,4 +1,4 @@
-"""Climb trials: interval, judgement and bookkeeping; one climb and one that cannot be, in
+"""Climb trials: judgement and bookkeeping; one climb and one that cannot be, in
 MuJoCo."""
 
 import math
@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest
 
 from trajopt.errors import ArgumentError
 from trajopt.problem.search import WHEELS
@@ -20,7 +19,6 @@ from trajopt.systems.smdw.climb import (
     judge,
     rate,
     run_climb,
-    wilson,
 )
 from trajopt.systems.smdw.planner import Plan, configurations, plan_configuration
 from trajopt.systems.smdw.problem import load_maneuver
@@ -28,18 +26,6 @@ from trajopt.systems.smdw.problem import load_maneuver
 FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"
 STEP = StepScene(0.05, (2.856, 0.76), 0.0, 0.8, 8.0, 0.047, 0.045, 0.03)
 CLIMB = Climb(STEP, (2.46, 0.76, -math.pi / 2), (0.0,) * 4, (0.0, 1.0), (0, 2), (0.02, 0.02))
-
-
-@pytest.mark.parametrize(("k", "n"), [(0, 10), (3, 10), (17, 20), (20, 20)])
-def test_wilson_is_scipys(k: int, n: int) -> None:
-    expected = binomtest(k, n).proportion_ci(method="wilson")
-    assert wilson(k, n) == pytest.approx((expected.low, expected.high), abs=1e-12)
-
-
-def test_wilson_edges() -> None:
-    assert wilson(0, 0) == (0.0, 1.0)
-    with pytest.raises(ArgumentError, match="successes"):
-        wilson(3, 2)
 
 
 def recording(rise: np.ndarray, turned: float, exploded: bool = False) -> Recording:

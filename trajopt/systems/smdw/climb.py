@@ -17,6 +17,7 @@ from multiprocessing import get_context
 import numpy as np
 
 from trajopt.errors import ArgumentError
+from trajopt.report.intervals import wilson
 from trajopt.robots.loc8 import WHEEL_RADIUS
 from trajopt.simulate.engine import Command, Controller, Recording, SimRobot, make_engine
 from trajopt.simulate.scene import Scene, Step
@@ -115,26 +116,6 @@ class Rate:
     @property
     def interval(self) -> tuple[float, float]:
         return wilson(self.successes, self.trials)
-
-
-def wilson(successes: int, trials: int, z: float = 1.959963984540054) -> tuple[float, float]:
-    """Wilson's score interval of a binomial share (Wilson 1927); (0, 1) without trials. ``z``: 95
-    %, two-sided.
-
-    Raises ArgumentError unless 0 <= successes <= trials.
-    """
-    if not 0 <= successes <= trials:
-        raise ArgumentError("successes", (successes, trials), "0 <= successes <= trials")
-    if trials == 0:
-        return 0.0, 1.0
-    share, square = successes / trials, z * z
-    middle = (share + square / (2 * trials)) / (1 + square / trials)
-    half = (
-        z
-        / (1 + square / trials)
-        * math.sqrt(share * (1 - share) / trials + square / (4 * trials**2))
-    )
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def climb_command(climb: Climb, robot: SimRobot) -> Command:

@@ -16,8 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
+from trajopt.report.intervals import wilson
 from trajopt.report.style import BLUE, GREEN, VERMILION, legend_beside, new_figure
-from trajopt.systems.smdw.climb import wilson
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,7 +16,7 @@ from rich.table import Table
 from trajopt.arrays import Array
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import made_folder, write_json, write_text
-from trajopt.systems.smdw.climb import wilson
+from trajopt.report.intervals import wilson
 from trajopt.systems.smdw.planner import Plan
 from trajopt.systems.smdw.problem import ManeuverProblem
 from trajopt.systems.smdw.trials import ClimbTrial

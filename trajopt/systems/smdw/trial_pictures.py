@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 
 from trajopt.arrays import Array
 from trajopt.report.ground_plan import draw_robot
+from trajopt.report.intervals import wilson
 from trajopt.report.style import (
     BLACK,
     BLUE,
@@ -30,7 +31,6 @@ from trajopt.report.style import (
     new_figure,
 )
 from trajopt.robots.platform import Platform
-from trajopt.systems.smdw.climb import wilson
 
 _SOURCE_COLOURS = (BLUE, ORANGE, GREY, GREEN)
 _WIDE = 0.8  # share of the room of a group that its bars take

@@ -1,5 +1,8 @@
-"""Routes of PowerBot for the optimizer benchmark: random corridors with static obstacles, and
-thesis 004's paths."""
+"""Routes of PowerBot as problems of the optimizer benchmark.
+
+Names: ``corridor/<seed>/length`` or ``/duration`` (a random corridor with static obstacles),
+``powerbot/<file>`` (a path of thesis 004).
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,13 @@ from typing import Literal
 
 import numpy as np
 
+from trajopt.arrays import Array
+from trajopt.bench.problems import Family
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
+from trajopt.objectives.base import Objective
 from trajopt.objectives.route import Corridor, RouteObjective
 from trajopt.paths.spline import uniform_basis
 from trajopt.problem.given_path import load_path_problem
@@ -105,3 +111,32 @@ def moved_knots(file: FilePath) -> RouteObjective:
         limits,
         cells=MOVED_CELLS,
     )
+
+
+def corridor(text: str, _root: FilePath) -> tuple[Objective, Array]:
+    """The problem ``corridor/<text>``."""
+    seed, _, kind = text.partition("/")
+    if not seed.isdigit() or kind not in ("length", "duration"):
+        raise ArgumentError(
+            "problem", f"corridor/{text}", "corridor/<seed>/length or corridor/<seed>/duration"
+        )
+    objective = random_corridor(int(seed), kind)  # type: ignore[arg-type]
+    return objective, objective.bounds
+
+
+def path_of_file(text: str, root: FilePath) -> tuple[Objective, Array]:
+    """The problem ``powerbot/<text>``; ``root`` is the folder with problem files."""
+    objective = moved_knots(root / "powerbot" / f"{text}.toml")
+    return objective, objective.bounds
+
+
+FAMILIES = {
+    "corridor": Family(
+        corridor,
+        {
+            "corridor, least length": r"corridor/\d+/length",
+            "corridor, least time under slip": r"corridor/\d+/duration",
+        },
+    ),
+    "powerbot": Family(path_of_file, {"thesis 004 path, least time": r"powerbot/.*"}),
+}
