@@ -50,10 +50,8 @@ def combined(
     if total > MOST_CASES:
         raise ArgumentError("axes", total, f"at most {MOST_CASES} cases")
     result: dict[str, AnyArray] = {}
-    inner = total
-    for size, columns in zip(sizes, groups.values(), strict=True):
-        inner //= max(size, 1)
-        places = np.arange(total) // max(inner, 1) % max(size, 1)
+    grid = np.unravel_index(np.arange(total), sizes) if sizes else ()
+    for places, columns in zip(grid, groups.values(), strict=True):
         for name, column in columns.items():
             if name in result:
                 raise ArgumentError(

@@ -18,12 +18,11 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Iterator
 from multiprocessing.connection import Connection
 from typing import Any
 
 from trajopt.sweeps.cases import Case
-from trajopt.sweeps.rows import DONE, ERROR, Row, results_of
+from trajopt.sweeps.rows import DONE, ERROR, Row, failed_row, results_of
 from trajopt.sweeps.runfunction import RunFunction, unpacked
 
 # Monotonic time at which the case in work started (s), then its index (-1: none). The time comes
@@ -49,7 +48,9 @@ THREAD_VARIABLES = (
 
 def main(connection_handle: int, progress_handle: int, parent: int, memory_limit: int) -> None:
     """Serve the host at the other end of ``connection_handle`` until it closes."""
-    _die_with_parent(parent)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    end_with_parent(parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host decides when to stop
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     faulthandler.enable()
@@ -103,20 +104,10 @@ def _row(run: RunFunction, index: int, case: Case) -> Row:
     started, clock = time.time(), time.perf_counter()
     try:
         results, arrays = results_of(run(case))
-    except (
-        BaseException
-    ) as error:  # SystemExit and KeyboardInterrupt of a case are that case's errors
-        return Row(
-            index,
-            ERROR,
-            {},
-            {},
-            type(error).__name__,
-            _message(error),
-            _traceback(error),
-            started,
-            time.perf_counter() - clock,
-        )
+    except BaseException as error:  # a case's SystemExit and KeyboardInterrupt are its errors
+        seconds = time.perf_counter() - clock
+        name = type(error).__name__
+        return failed_row(index, ERROR, name, _message(error), _traceback(error), seconds)
     return Row(index, DONE, results, arrays, "", "", "", started, time.perf_counter() - clock)
 
 
@@ -142,23 +133,14 @@ def _traceback(error: BaseException) -> str:
     return "".join(lines[-_TRACEBACK_LINES:])[-20 * _LONGEST_MESSAGE :]
 
 
-def _die_with_parent(parent: int) -> None:
-    """End when the host ends, however it ends: by the kernel on Linux, and by looking on every
-    system."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:
+def end_with_parent(parent: int, grace: float = 0.0) -> None:
+    """Make this process end ``grace`` s after its parent has ended, however that ends: seen on
+    every system by looking."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        time.sleep(grace)
         os._exit(1)
-    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
-
-def _watch(parent: int) -> None:
-    for _ in _ticks(2.0):
-        if os.getppid() != parent:
-            os._exit(1)
-
-
-def _ticks(seconds: float) -> Iterator[None]:
-    while True:
-        time.sleep(seconds)
-        yield
+    threading.Thread(target=watch, daemon=True).start()

@@ -33,7 +33,7 @@ from trajopt.sweeps.host import (
     stop_mark,
     warm_up,
 )
-from trajopt.sweeps.rows import CRASHED, Kind, Row, row_table
+from trajopt.sweeps.rows import CRASHED, Kind, failed_row, row_table
 from trajopt.sweeps.runfunction import Packed
 from trajopt.sweeps.store import Store
 
@@ -143,14 +143,11 @@ class Drive:
             mark.unlink(missing_ok=True)
 
     # -- chunks
-    # ---------------------------------------------------------------------------------------
 
     def _sample_first(self) -> None:
         """Bring a first, a middle and a last case to the front."""
-        n = len(self.places)
-        if n > SAMPLED:
-            front = np.array([0, n // 2, n - 1])
-            self.places = np.concatenate([self.places[front], np.delete(self.places, front)])
+        front = _spread(len(self.places))
+        self.places = np.concatenate([self.places[front], np.delete(self.places, front)])
 
     def _waiting(self) -> bool:
         return bool(self.retried or self.suspects or self.next < len(self.places))
@@ -203,7 +200,6 @@ class Drive:
         )
 
     # -- outcomes
-    # -------------------------------------------------------------------------------------
 
     def _collect(self, done: dict[Future[ChunkReport], _Chunk]) -> bool:
         """Take in finished chunks; True when the executor broke."""
@@ -273,18 +269,8 @@ class Drive:
 
     def _record_guilty(self, chunk: _Chunk) -> None:
         cases = self.table.take(chunk.places)
-        row = Row(
-            0,
-            CRASHED,
-            {},
-            {},
-            "WorkerDied",
-            f"its worker died {chunk.deaths} times while running this case",
-            "",
-            time.time(),
-            0.0,
-            chunk.deaths,
-        )
+        told = f"its worker died {chunk.deaths} times while running this case"
+        row = failed_row(0, CRASHED, "WorkerDied", told, "", 0.0)._replace(attempts=chunk.deaths)
         self.setup.store.write_part(
             "parts",
             chunk_name(cases),
@@ -374,12 +360,14 @@ def chunk_name(cases: CaseTable) -> str:
     return hashlib.blake2b(cases.ids.tobytes(), digest_size=8).hexdigest()
 
 
-def sampled(table: CaseTable, count: int = SAMPLED) -> CaseTable:
-    """First, middle and last cases of a table, for estimates."""
-    places = np.unique(
-        np.linspace(0, len(table) - 1, min(count, len(table))).round().astype(np.int64)
-    )
-    return table.take(places)
+def sampled(table: CaseTable) -> CaseTable:
+    """First, middle and last case of a table, for estimates."""
+    return table.take(_spread(len(table)))
+
+
+def _spread(count: int) -> IntArray:
+    """SAMPLED positions or fewer, from the first to the last of ``count``."""
+    return np.unique(np.linspace(0, count - 1, min(SAMPLED, count)).round().astype(np.int64))
 
 
 def _is_death(error: BaseException) -> bool:

@@ -11,8 +11,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import threading
-import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
@@ -21,7 +19,7 @@ from multiprocessing import get_context
 from typing import Any
 
 from trajopt.errors import ArgumentError, MissingDependencyError
-from trajopt.sweeps.child import THREAD_VARIABLES
+from trajopt.sweeps.child import THREAD_VARIABLES, end_with_parent
 
 LOOPBACK = "127.0.0.1"
 # Starts in a row that may fail before an engine counts as broken. A Dask cluster takes seconds to
@@ -94,9 +92,8 @@ def processes(workers: int) -> Engine:
     return Engine(f"{workers} processes", start, workers)
 
 
-def dask_local(workers: int, *, host: str = LOOPBACK, dashboard: str | None = None) -> Engine:
-    """Engine of a Dask cluster on this machine; ``dashboard`` is an address such as
-    "127.0.0.1:8787" (none: off)."""
+def dask_local(workers: int, *, host: str = LOOPBACK) -> Engine:
+    """Engine of a Dask cluster on this machine."""
     distributed = _distributed()
 
     @contextmanager
@@ -112,11 +109,9 @@ def dask_local(workers: int, *, host: str = LOOPBACK, dashboard: str | None = No
                 host=host,
                 memory_limit=0,
                 silence_logs=40,
-                dashboard_address=dashboard,
-                worker_dashboard_address=dashboard and f"{host}:0",
-                # Without a dashboard the scheduler still answers HTTP: on any free port, not on a
-                # fixed one.
-                scheduler_kwargs={} if dashboard else {"dashboard_address": f"{host}:0"},
+                dashboard_address=None,
+                # The scheduler still answers HTTP: on any free port, not on a fixed one.
+                scheduler_kwargs={"dashboard_address": f"{host}:0"},
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
@@ -193,9 +188,9 @@ def dask_slurm(
 
 def available_processors() -> int:
     """Processors this process may use: fewer than the machine has under Slurm or taskset."""
-    return (
-        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-    )
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def prepare_worker(parent: int) -> None:
@@ -204,14 +199,8 @@ def prepare_worker(parent: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in THREAD_VARIABLES:
         os.environ[name] = "1"
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-
-
-def _end_with(parent: int) -> None:
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    time.sleep(_GRACE)  # the chunk in work sees it too, stops, and stores what is finished
-    os._exit(1)
+    # The chunk in work sees it too, stops, and stores what is finished.
+    end_with_parent(parent, _GRACE)
 
 
 @contextmanager

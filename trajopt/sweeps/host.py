@@ -34,6 +34,7 @@ from trajopt.sweeps.rows import (
     Kind,
     Row,
     array_table,
+    failed_row,
     fitted,
     parameter_kind,
     result_kinds,
@@ -157,43 +158,19 @@ def _rows_of(job: ChunkJob, should_stop: Callable[[], bool]) -> list[Row]:
         todo = [i for i in todo if i not in rows]
         if death is None:
             continue
-        deaths[death.index] += 1
-        if death.index in rows or death.index < 0:  # between cases: nobody's fault
-            if deaths[death.index] > _IDLE_DEATHS:
+        deaths[death.place] += 1
+        if death.place in rows or death.place < 0:  # between cases: nobody's fault
+            if deaths[death.place] > _IDLE_DEATHS:
                 raise RunLoadError(
-                    f"worker processes keep dying between cases: {death.reason}\n{death.output}"
+                    f"worker processes keep dying between cases: {death.message}\n{death.traceback}"
                 )
-            continue
-        if death.status == TIMEOUT or deaths[death.index] > RETRIES:
-            rows[death.index] = Row(
-                death.index,
-                death.status,
-                {},
-                {},
-                death.error,
-                death.reason,
-                death.output,
-                time.time() - death.seconds,
-                death.seconds,
-                deaths[death.index],
-            )
-        todo = [i for i in todo if i not in rows]
+        elif death.status == TIMEOUT or deaths[death.place] > RETRIES:
+            rows[death.place] = death
+            todo.remove(death.place)
     return [
         row._replace(attempts=deaths[i] + (row.status not in (CRASHED, TIMEOUT)))
         for i, row in rows.items()
     ]
-
-
-@dataclass(frozen=True)
-class _Death:
-    """End of a child: the case it was at (-1: none), and why."""
-
-    index: int
-    status: str
-    error: str
-    reason: str
-    output: str
-    seconds: float
 
 
 class _Child:
@@ -235,9 +212,9 @@ class _Child:
         rows: dict[int, Row],
         limit: float,
         should_stop: Callable[[], bool],
-    ) -> _Death | None:
-        """Run cases, adding to ``rows``; the child's death, or None when finished or told to
-        stop."""
+    ) -> Row | None:
+        """Run cases, adding to ``rows``; the child's death as the row of the case it was at (place
+        -1: none), or None when finished or told to stop."""
         try:
             if not self.ready:
                 if not self._until("ready", rows, limit, should_stop):
@@ -253,9 +230,8 @@ class _Child:
         except _Overdue as error:
             index, started = noted_progress(self.progress)
             self.close()
-            return _Death(
-                index, TIMEOUT, "TimeLimit", str(error), self._text(), time.monotonic() - started
-            )
+            seconds = time.monotonic() - started
+            return failed_row(index, TIMEOUT, "TimeLimit", str(error), self._text(), seconds)
 
     def _until(
         self, what: str, rows: dict[int, Row], limit: float, should_stop: Callable[[], bool]
@@ -286,7 +262,7 @@ class _Child:
             if should_stop():
                 return False
 
-    def _death(self) -> _Death:
+    def _death(self) -> Row:
         index, started = noted_progress(self.progress)
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(2.0)
@@ -297,14 +273,8 @@ class _Child:
                 while data := os.read(self.process.stdout.fileno(), 1 << 16):
                     self.output = (self.output + data)[-_TAIL:]
         self.close()
-        return _Death(
-            index,
-            CRASHED,
-            "WorkerDied",
-            _why(code),
-            self._text(),
-            max(0.0, time.monotonic() - started) if index >= 0 else 0.0,
-        )
+        seconds = max(0.0, time.monotonic() - started) if index >= 0 else 0.0
+        return failed_row(index, CRASHED, "WorkerDied", _why(code), self._text(), seconds)
 
     def _text(self) -> str:
         return self.output.decode(errors="replace")

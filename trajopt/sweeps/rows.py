@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 import json
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
@@ -37,6 +38,13 @@ class Row(NamedTuple):
     started: float = 0.0  # s since 1970
     seconds: float = 0.0
     attempts: int = 1
+
+
+def failed_row(
+    place: int, status: str, error: str, message: str, output: str, seconds: float
+) -> Row:
+    """Row of a case that ends now without results; ``output`` is traceback or printed text."""
+    return Row(place, status, {}, {}, error, message, output, time.time() - seconds, seconds)
 
 
 def results_of(returned: Any) -> tuple[dict[str, Any], dict[str, AnyArray]]:
@@ -78,8 +86,10 @@ def _flatten(
 def _cell(name: str, value: Any) -> Any:
     if isinstance(value, (np.generic, np.ndarray)) and value.ndim == 0:
         value = value.item()
-    if value is None or isinstance(value, (bool, str)):
+    if value is None or isinstance(value, bool):
         return value
+    if isinstance(value, str):
+        return str(value)
     if isinstance(value, (int, float)):
         return float(value)  # one kind for all numbers, so that parts of a sweep never disagree
     if (
@@ -96,19 +106,13 @@ def _cell(name: str, value: Any) -> Any:
     )
 
 
+_CELL_KINDS: dict[type, Kind] = {bool: "flag", str: "text", list: "numbers", float: "number"}
+_COLUMN_KINDS: dict[str, Kind] = {"b": "flag", "i": "integer", "f": "number"}
+
+
 def kind_of(value: Any) -> Kind | None:
     """Kind of column that holds a cell; None for a missing value."""
-    match value:
-        case None:
-            return None
-        case bool():
-            return "flag"
-        case str():
-            return "text"
-        case list():
-            return "numbers"
-        case _:
-            return "number"
+    return _CELL_KINDS.get(type(value))
 
 
 def result_kinds(rows: Sequence[Row], known: Mapping[str, Kind]) -> dict[str, Kind]:
@@ -144,13 +148,8 @@ def fitted(rows: Sequence[Row], kinds: Mapping[str, Kind]) -> list[Row]:
 
 def parameter_kind(column: AnyArray) -> Kind:
     """Kind of the table column that holds a column of case values."""
-    match column.dtype.kind:
-        case "b":
-            return "flag"
-        case "i":
-            return "integer"
-        case "f":
-            return "number"
+    if column.dtype.kind in _COLUMN_KINDS:
+        return _COLUMN_KINDS[column.dtype.kind]
     types = {type(v) for v in column.tolist()} - {type(None)}
     if types == {str}:
         return "text"

@@ -17,8 +17,8 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -28,7 +28,7 @@ from trajopt.arrays import IntArray
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.sweeps.cases import CaseTable
 from trajopt.sweeps.child import THREAD_VARIABLES
-from trajopt.sweeps.drive import MOST_CASES, SAMPLED, chunk_name, sampled
+from trajopt.sweeps.drive import MOST_CASES, chunk_name, sampled
 from trajopt.sweeps.host import CaseLimits, ChunkJob, end_child, parameter_kinds, run_chunk
 from trajopt.sweeps.rows import arrow
 from trajopt.sweeps.runfunction import RunFunction, name_of, packed
@@ -109,7 +109,8 @@ def submit(
     count = min(max(count, 1), len(jobs), MOST_ELEMENTS)
     for number in range(count):
         store.write_text(f"jobs/{folder.name}/element-{number}.log", "")
-        _write_jobs(store, folder / f"element-{number}.pickle", jobs[number::count])
+        todo = partial(pickle.dump, jobs[number::count])
+        store.write(f"jobs/{folder.name}/element-{number}.pickle", todo)
     script = _script(folder, count, options)
     store.write_text(f"jobs/{folder.name}/array.sh", script)
     run_id = record_run(
@@ -164,7 +165,7 @@ def _left(job: ChunkJob) -> ChunkJob | None:
 def _sampled_seconds(
     table: CaseTable, run: RunFunction, store: Store, limits: CaseLimits, retry_failed: bool
 ) -> float:
-    trial = sampled(table, SAMPLED)
+    trial = sampled(table)
     sweep(
         trial,
         run,
@@ -199,15 +200,6 @@ def _chunks(
             )
         )
     return jobs
-
-
-def _write_jobs(store: Store, file: Path, jobs: Sequence[ChunkJob]) -> None:
-    temporary = store.path / "temporary" / f"jobs-{uuid.uuid4().hex}"
-    with open(temporary, "wb") as handle:
-        pickle.dump(list(jobs), handle)
-        handle.flush()
-        os.fsync(handle.fileno())
-    os.replace(temporary, file)
 
 
 def _script(folder: Path, count: int, options: SlurmOptions) -> str:

@@ -14,16 +14,15 @@ may exist several times; reading keeps one: a finished one before a failed one, 
 from __future__ import annotations
 
 import errno
-import glob
 import json
 import os
 import time
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,45 +60,20 @@ class Store:
     path: Path
 
     # -- writing
-    # --------------------------------------------------------------------------------------
 
-    def write_part(self, folder: str, name: str, table: Any) -> str:
-        """Write an Arrow table durably as ``folder/name-<random>.parquet``; the file's name is
-        returned.
+    def write(self, place: str, write: Callable[[BinaryIO], object]) -> None:
+        """Write the file ``place`` of the store durably: temporary name, flush, rename.
 
         Raises StoreError when the disk is full or the directory cannot be written; nothing
         half-written stays.
         """
-        import pyarrow.parquet as pq
-
-        unique = f"{name}-{uuid.uuid4().hex[:12]}.parquet"
-        temporary = self.path / "temporary" / unique
-        try:
-            for place in (
-                temporary.parent,
-                self.path / folder,
-            ):  # git and some copies drop empty directories
-                place.mkdir(exist_ok=True)
-            with open(temporary, "wb") as file:
-                pq.write_table(table, file, compression="zstd")
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(temporary, self.path / folder / unique)
-            _sync_directory(self.path / folder)
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise _write_error(self.path, error) from None
-        return unique
-
-    def write_text(self, place: str, text: str) -> None:
-        """Write a small file durably: temporary name, flush, rename. Raises StoreError."""
-        temporary = self.path / "temporary" / f"text-{uuid.uuid4().hex}"
         target = self.path / place
+        temporary = self.path / "temporary" / f"{uuid.uuid4().hex}-{target.name}"
         try:
-            temporary.parent.mkdir(exist_ok=True)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with open(temporary, "w", encoding="utf-8") as file:
-                file.write(text)
+            for folder in (temporary.parent, target.parent):  # git and some copies drop empty ones
+                folder.mkdir(parents=True, exist_ok=True)
+            with open(temporary, "wb") as file:
+                write(file)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, target)
@@ -108,12 +82,22 @@ class Store:
             temporary.unlink(missing_ok=True)
             raise _write_error(self.path, error) from None
 
+    def write_part(self, folder: str, name: str, table: Any) -> None:
+        """Write an Arrow table durably as ``folder/name-<random>.parquet``. Raises as ``write``."""
+        import pyarrow.parquet as pq
+
+        place = f"{folder}/{name}-{uuid.uuid4().hex[:12]}.parquet"
+        self.write(place, lambda file: pq.write_table(table, file, compression="zstd"))
+
+    def write_text(self, place: str, text: str) -> None:
+        """Write a small file durably. Raises as ``write``."""
+        self.write(place, lambda file: file.write(text.encode()))
+
     # -- reading
-    # --------------------------------------------------------------------------------------
 
     def parts(self, folder: str = "parts") -> list[Path]:
         """Files of whole parts, sorted by name."""
-        return sorted(Path(p) for p in glob.glob(str(self.path / folder / "*.parquet")))
+        return sorted((self.path / folder).glob("*.parquet"))
 
     def table(self, columns: Sequence[str] | None = None) -> Any:
         """All cases as one Arrow table, one row a case, sorted by case.
@@ -216,7 +200,6 @@ class Store:
         return united(list(tables.values()))
 
     # -- upkeep
-    # ---------------------------------------------------------------------------------------
 
     def compact(self) -> tuple[int, int]:
         """Merge small parts into large ones, dropping double rows; safe while sweeps run.
@@ -227,24 +210,17 @@ class Store:
         import pyarrow.parquet as pq
 
         for folder in ("parts", "arrays"):
-            batch: list[Path] = []
-            rows = 0
-            for file in [*self.parts(folder), None]:
-                count = 0
-                if file is not None:
-                    try:
-                        count = pq.read_metadata(file).num_rows
-                    except FileNotFoundError:  # another compaction was here
-                        continue
-                if batch and (file is None or rows + count > _COMPACT_ROWS):
-                    if len(batch) > 1:
-                        self._merge(folder, batch)
-                    batch, rows = [], 0
-                if file is not None:
-                    batch.append(file)
-                    rows += count
+            sizes: dict[Path, int] = {}
+            for file in self.parts(folder):
+                with suppress(FileNotFoundError):  # another compaction was here
+                    sizes[file] = pq.read_metadata(file).num_rows
+            batches = np.cumsum(list(sizes.values()), dtype=np.int64) // _COMPACT_ROWS
+            for number in np.unique(batches):
+                batch = [f for f, n in zip(sizes, batches, strict=True) if n == number]
+                if len(batch) > 1:
+                    self._merge(folder, batch)
         for leftover in (self.path / "temporary").glob("*"):
-            with _gone_is_fine():
+            with suppress(FileNotFoundError):
                 if time.time() - leftover.stat().st_mtime > _STALE:
                     leftover.unlink()
         self.align()
@@ -261,7 +237,7 @@ class Store:
 
         schemas = {}
         for file in self.parts():
-            with _gone_is_fine():
+            with suppress(FileNotFoundError):
                 schemas[file] = pq.read_schema(file)
         common = common_schema(schemas.values())
         columns = {f.name: f.type for f in common}
@@ -348,11 +324,3 @@ def _write_error(path: Path, error: OSError) -> StoreError:
             f"{path}: no space left; free some and run the same command again: finished cases are kept"
         )
     return StoreError(f"{path}: cannot write the store ({error})")
-
-
-@contextmanager
-def _gone_is_fine() -> Iterator[None]:
-    try:
-        yield
-    except FileNotFoundError:
-        return

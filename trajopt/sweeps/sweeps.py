@@ -24,7 +24,7 @@ from trajopt.sweeps.cases import CaseTable, case_table, identity_base
 from trajopt.sweeps.drive import Drive, Progress, Setup
 from trajopt.sweeps.executors import Engine, engine_of
 from trajopt.sweeps.host import CaseLimits, default_memory, parameter_kinds
-from trajopt.sweeps.rows import FIXED_COLUMNS, Kind, arrow
+from trajopt.sweeps.rows import FIXED_COLUMNS, Kind, arrow, arrow_type
 from trajopt.sweeps.runfunction import RunFunction, name_of, packed
 from trajopt.sweeps.store import Store, open_store
 
@@ -121,29 +121,19 @@ def known_kinds(store: Store, table: CaseTable) -> dict[str, Kind]:
     ones."""
     import pyarrow.parquet as pq
 
+    told: tuple[Kind, ...] = ("number", "flag", "text", "numbers")
+    kinds_by_type = {str(arrow_type(kind)): kind for kind in told}
     kinds: dict[str, Kind] = {}
-    names: dict[str, Kind] = {
-        "double": "number",
-        "bool": "flag",
-        "string": "text",
-        "list<element: double>": "numbers",
-    }
     parts = store.parts()
     for file in parts[:1] + parts[-1:]:
         for column in pq.read_schema(file):
-            kind = names.get(str(column.type))
-            name = column.name.removeprefix("result.")
-            if (
-                column.name not in table.columns
-                and column.name not in FIXED_COLUMNS
-                and kind is not None
-            ):
-                kinds.setdefault(name, kind)
+            kind = kinds_by_type.get(str(column.type))
+            if kind and column.name not in table.columns and column.name not in FIXED_COLUMNS:
+                kinds.setdefault(column.name.removeprefix("result."), kind)
     return kinds
 
 
 # -- record of runs
-# -----------------------------------------------------------------------------------
 
 
 def record_run(
@@ -190,9 +180,7 @@ def close_record(store: Store, run_id: str, state: str, counts: Mapping[str, int
         entry = json.loads(file.read_text(encoding="utf-8"))
         entry.update(state=state, ended=time.time(), counts=dict(counts))
         _write_record(store, run_id, entry)
-    except (
-        Exception
-    ):  # a full disk: the reason is already on its way, and the record is not worth hiding it
+    except Exception:  # a full disk: the reason is on its way, and must not be hidden by this one
         if state == "finished":
             raise
 
