@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import time
-from asyncio import CancelledError
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
@@ -23,7 +22,7 @@ import numpy as np
 from trajopt.arrays import IntArray
 from trajopt.errors import TrajoptError
 from trajopt.sweeps.cases import CaseTable
-from trajopt.sweeps.executors import Engine
+from trajopt.sweeps.executors import Engine, end, is_death, started
 from trajopt.sweeps.host import (
     RETRIES,
     CaseLimits,
@@ -31,28 +30,20 @@ from trajopt.sweeps.host import (
     ChunkReport,
     run_chunk,
     stop_mark,
-    warm_up,
 )
 from trajopt.sweeps.rows import CRASHED, Kind, failed_row, row_table
 from trajopt.sweeps.runfunction import Packed
 from trajopt.sweeps.store import Store
+from trajopt.sweeps.supervisor import warm_up
 
 SAMPLED = 3  # cases run first, to learn their time and columns
-SHORTEST_CHUNK, LONGEST_CHUNK = (
-    0.25,
-    5.0,
-)  # s of work. chosen: a part costs some 10 ms, a crash costs a chunk
-_SHARE = (
-    4  # a chunk is a quarter of what is left for its worker: large first, small at the end; chosen
-)
+# s of work; chosen: a part costs some 10 ms, a crash costs a chunk
+SHORTEST_CHUNK, LONGEST_CHUNK = 0.25, 5.0
+_SHARE = 4  # a chunk is a quarter of what is left for its worker: large first; chosen
 MOST_CASES = 10_000  # cases of one chunk, whatever their time; chosen
 _AHEAD = 2  # chunks in flight a worker, so that none waits for the submitter; chosen
 _STOP_GRACE = 20.0  # s that workers get to store what they have after a stop; chosen
 _MOST_REBUILDS = 1_000  # of executors, before something else must be wrong; chosen
-
-
-class WorkerStartError(TrajoptError):
-    """Worker processes cannot start."""
 
 
 @dataclass(frozen=True)
@@ -130,16 +121,11 @@ class Drive:
                     rebuilds += 1
                     self._blame(flights)
                     context, executor = self._rebuilt(context, rebuilds)
-        except (
-            BaseException
-        ):  # Ctrl-C, a full disk: let the workers keep what they have, then pass it on
+        except BaseException:  # Ctrl-C, a full disk: workers keep what they have, then pass it on
             self._stop(flights, mark)
             raise
         finally:
-            with contextlib.suppress(
-                Exception
-            ):  # of a cluster that lost processes: all that counts is stored
-                context.__exit__(None, None, None)
+            end(context)
             mark.unlink(missing_ok=True)
 
     # -- chunks
@@ -212,10 +198,8 @@ class Drive:
                 self._died(chunk)
             except TrajoptError:
                 raise
-            except (
-                Exception
-            ) as error:  # Dask's KilledWorker and its like: the task's worker is gone
-                if not _is_death(error):
+            except Exception as error:  # Dask's KilledWorker and its like: the worker is gone
+                if not is_death(error):
                     raise
                 self._died(chunk)
             else:
@@ -227,18 +211,13 @@ class Drive:
         for name, kind in outcome.kinds.items():
             self.kinds.setdefault(name, kind)
         finished = sum(outcome.counts.values())
-        if (
-            outcome.unfinished and not self.stopping
-        ):  # stopped from outside: what is left runs again
+        if outcome.unfinished and not self.stopping:  # stopped from outside: the rest runs again
             self.next_missing(chunk)
         if finished:
-            first = self.seconds_a_case is None
-            seconds = outcome.median_seconds if first else outcome.seconds / finished
-            self.seconds_a_case = (
-                seconds
-                if first or self.seconds_a_case is None
-                else (0.5 * (self.seconds_a_case + seconds))
-            )
+            if self.seconds_a_case is None:
+                self.seconds_a_case = outcome.median_seconds
+            else:
+                self.seconds_a_case = 0.5 * (self.seconds_a_case + outcome.seconds / finished)
         self.report(Progress(dict(self.counts), len(self.places), time.monotonic() - self.started))
 
     def next_missing(self, chunk: _Chunk) -> None:
@@ -271,11 +250,8 @@ class Drive:
         cases = self.table.take(chunk.places)
         told = f"its worker died {chunk.deaths} times while running this case"
         row = failed_row(0, CRASHED, "WorkerDied", told, "", 0.0)._replace(attempts=chunk.deaths)
-        self.setup.store.write_part(
-            "parts",
-            chunk_name(cases),
-            row_table([row], cases, self.setup.parameter_kinds, self.kinds, "submitter"),
-        )
+        table = row_table([row], cases, self.setup.parameter_kinds, self.kinds, "submitter")
+        self.setup.store.write_part("parts", chunk_name(cases), table)
         self.counts[CRASHED] += 1
         if self.seconds_a_case is None:
             self.seconds_a_case = SHORTEST_CHUNK
@@ -291,55 +267,20 @@ class Drive:
         flights.clear()
 
     def _started(self) -> tuple[AbstractContextManager[Executor], Executor]:
-        """A working executor. One whose workers cannot even start is no case's fault: raises
-        WorkerStartError."""
-        fault: BaseException | None = None
-        for _ in range(self.engine.starts):
-            context = self.engine.start()
-            try:
-                executor = context.__enter__()
-            except TrajoptError:
-                raise
-            except (
-                Exception,
-                CancelledError,
-            ) as error:  # a cluster some of whose processes died while it started
-                fault = error
-                continue
-            try:
-                starts = [
-                    executor.submit(warm_up, self.setup.run, self.setup.limits.memory)
-                    for _ in range(self.engine.workers)
-                ]
-                done, _ = wait(starts, return_when=FIRST_COMPLETED)
-                for start in done:
-                    start.result()
-                return context, executor
-            except BaseException as error:
-                with contextlib.suppress(Exception):
-                    context.__exit__(None, None, None)
-                if not isinstance(error, BrokenExecutor) and not _is_death(error):
-                    raise
-        raise WorkerStartError(
-            f"{self.engine.name}: workers died at {self.engine.starts} starts in a row, before any "
-            "case; finished cases are kept; a script that runs a sweep needs "
-            '`if __name__ == "__main__":` around what it does'
-        ) from fault
+        return started(self.engine, warm_up, self.setup.run, self.setup.limits.memory)
 
     def _rebuilt(
         self, context: AbstractContextManager[Executor], rebuilds: int
     ) -> tuple[AbstractContextManager[Executor], Executor]:
-        with contextlib.suppress(Exception):
-            context.__exit__(None, None, None)
+        end(context)
         if not self.engine.rebuilds or rebuilds > _MOST_REBUILDS:
             raise BrokenExecutor(
                 f"the executor ({self.engine.name}) broke and cannot be made anew; finished cases "
                 "are kept: run the sweep again, or give a factory instead of an executor"
             )
         if self.seconds_a_case is None and rebuilds > RETRIES:
-            self.seconds_a_case = (
-                SHORTEST_CHUNK  # the sampled cases kill their worker: go on with small chunks
-            )
+            # The sampled cases kill their worker: go on with small chunks.
+            self.seconds_a_case = SHORTEST_CHUNK
         return self._started()
 
     def _stop(self, flights: dict[Future[ChunkReport], Any], mark: Path) -> None:
@@ -368,14 +309,3 @@ def sampled(table: CaseTable) -> CaseTable:
 def _spread(count: int) -> IntArray:
     """SAMPLED positions or fewer, from the first to the last of ``count``."""
     return np.unique(np.linspace(0, count - 1, min(SAMPLED, count)).round().astype(np.int64))
-
-
-def _is_death(error: BaseException) -> bool:
-    """Whether an error of a future says that the worker is gone (Dask; its classes are not imported
-    here)."""
-    return type(error).__name__ in (
-        "KilledWorker",
-        "CancelledError",
-        "FutureCancelledError",
-        "CommClosedError",
-    )

@@ -11,14 +11,15 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from asyncio import CancelledError
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any
 
-from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.errors import ArgumentError, MissingDependencyError, TrajoptError
 from trajopt.sweeps.child import THREAD_VARIABLES, end_with_parent
 
 LOOPBACK = "127.0.0.1"
@@ -27,6 +28,10 @@ LOOPBACK = "127.0.0.1"
 # chosen: never seen in 300 random kills.
 _POOL_STARTS, _DASK_STARTS = 6, 12
 _GRACE = 5.0  # s an orphaned worker gets to store what it has; chosen
+
+
+class WorkerStartError(TrajoptError):
+    """Worker processes cannot start."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +206,51 @@ def prepare_worker(parent: int) -> None:
         os.environ[name] = "1"
     # The chunk in work sees it too, stops, and stores what is finished.
     end_with_parent(parent, _GRACE)
+
+
+def started(
+    engine: Engine, task: Callable[..., object], *arguments: Any
+) -> tuple[AbstractContextManager[Executor], Executor]:
+    """A working executor and its context, entered: one of its workers has done ``task``, all got
+    it. Workers that cannot even start are no case's fault: raises WorkerStartError."""
+    fault: BaseException | None = None
+    for _ in range(engine.starts):
+        context = engine.start()
+        try:
+            executor = context.__enter__()
+        except TrajoptError:
+            raise
+        except (Exception, CancelledError) as error:  # a cluster that lost processes meanwhile
+            fault = error
+            continue
+        try:
+            tasks = [executor.submit(task, *arguments) for _ in range(engine.workers)]
+            done, _ = wait(tasks, return_when=FIRST_COMPLETED)
+            for first in done:
+                first.result()
+            return context, executor
+        except BaseException as error:
+            end(context)
+            if not isinstance(error, BrokenExecutor) and not is_death(error):
+                raise
+    raise WorkerStartError(
+        f"{engine.name}: workers died at {engine.starts} starts in a row, before any "
+        "case; finished cases are kept; a script that runs a sweep needs "
+        '`if __name__ == "__main__":` around what it does'
+    ) from fault
+
+
+def end(context: AbstractContextManager[Executor]) -> None:
+    """Leave an executor, also one that lost processes: all that counts is stored."""
+    with contextlib.suppress(Exception):
+        context.__exit__(None, None, None)
+
+
+def is_death(error: BaseException) -> bool:
+    """Whether an error of a future says that the worker is gone (Dask; its classes are not imported
+    here)."""
+    gone = ("KilledWorker", "CancelledError", "FutureCancelledError", "CommClosedError")
+    return type(error).__name__ in gone
 
 
 @contextmanager

@@ -19,9 +19,7 @@ Kind = Literal["number", "integer", "flag", "text", "numbers", "json"]
 DONE, ERROR, TIMEOUT, CRASHED = "done", "error", "timeout", "crashed"
 RUN_COLUMNS = ("run_started", "run_seconds", "run_host", "run_attempts", "error_traceback")
 FIXED_COLUMNS = ("case", "status", "case_seed", "error", "error_message", *RUN_COLUMNS)
-_LONGEST = (
-    1_000  # numbers in a list that may stay a table cell; longer ones belong into an array. chosen
-)
+_LONGEST = 1_000  # numbers in a list that may be a cell; longer ones belong into an array; chosen
 
 
 class Row(NamedTuple):

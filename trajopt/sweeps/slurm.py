@@ -29,10 +29,11 @@ from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.sweeps.cases import CaseTable
 from trajopt.sweeps.child import THREAD_VARIABLES
 from trajopt.sweeps.drive import MOST_CASES, chunk_name, sampled
-from trajopt.sweeps.host import CaseLimits, ChunkJob, end_child, parameter_kinds, run_chunk
+from trajopt.sweeps.host import CaseLimits, ChunkJob, parameter_kinds, run_chunk
 from trajopt.sweeps.rows import arrow
 from trajopt.sweeps.runfunction import RunFunction, name_of, packed
 from trajopt.sweeps.store import Store
+from trajopt.sweeps.supervisor import end_child
 from trajopt.sweeps.sweeps import close_record, known_kinds, missing, record_run, sweep
 
 CHUNK_SECONDS = 5.0  # work between two parts of an element: what a killed element loses; chosen

@@ -1,10 +1,11 @@
 """The store of a sweep: a directory of Parquet parts that is whole at every instant.
 
-    store.json            format of the store parts/*.parquet       finished cases, one row a case;
-    readable by pandas, polars and DuckDB as they are arrays/*.parquet      arrays that run
-    functions returned (trajectories): case, name, shape, values runs/*.json           who ran what,
-    with which versions, when jobs/                 what Slurm array elements are to do temporary/
-    parts being written
+- ``store.json``: format of the store
+- ``parts/*.parquet``: finished cases, one row a case; pandas, polars and DuckDB read them as they are
+- ``arrays/*.parquet``: arrays that run functions returned: case, name, shape, values
+- ``runs/*.json``: who ran what, with which versions, when
+- ``jobs/``: what Slurm array elements are to do
+- ``temporary/``: files being written
 
 A part is written under a temporary name, flushed to disk and renamed, and never changed afterwards.
 Its name is its chunk's and a random one, so that several writers never meet. Rows of the same case
@@ -39,14 +40,11 @@ from trajopt.sweeps.merging import (
 from trajopt.sweeps.rows import DONE, RUN_COLUMNS, arrow
 
 FORMAT = 1
+_FOLDERS = ("temporary", "parts", "arrays", "runs", "jobs")  # the first marks a store
 _STALE = 24 * 3600.0  # s after which a temporary file's writer is taken for dead; chosen
-_READ_TRIES = (
-    100  # listings of the parts before giving up, while compactions go on meanwhile; chosen
-)
+_READ_TRIES = 100  # listings of the parts before giving up, while compactions go on; chosen
 _COMPACT_ROWS = 1_000_000  # rows of one compacted part, to bound memory; chosen
-_ALIGNED_TOGETHER = (
-    100  # parts of at most 10,000 rows that become one when their columns are completed; chosen
-)
+_ALIGNED_TOGETHER = 100  # parts of at most 10,000 rows that become one in ``align``; chosen
 
 
 class StoreError(TrajoptError):
@@ -283,13 +281,7 @@ def open_store(path: str | Path | Store, *, create: bool = True) -> Store:
         if place.exists() and any(place.iterdir()) and not (place / "temporary").is_dir():
             raise StoreError(f"{place}: neither empty nor a sweep store; give another directory")
         try:
-            for folder in (
-                "temporary",
-                "parts",
-                "arrays",
-                "runs",
-                "jobs",
-            ):  # temporary first: it marks a store
+            for folder in _FOLDERS:
                 (place / folder).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise _write_error(place, error) from None
