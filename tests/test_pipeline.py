@@ -110,6 +110,24 @@ def test_feedback_in_the_check_brings_pose_and_critical_wheels_to_the_goal(scena
     assert other.final_distance != report.final_distance
 
 
+@pytest.mark.parametrize("control", [None, "wheel servo", "pose and phase"])
+def test_the_check_starts_with_the_wheel_angles_that_the_plan_starts_with(scenario, control):
+    """Physics begins at the problem's wheel angles, so that the critical wheels end at the goal's
+    (modulo a turn), measured on the wheels themselves."""
+    pytest.importorskip("mujoco")
+    start = np.array([0.9, -1.4, 2.1, 0.5])
+    problem = scenario.replace({"start.wheels": start.tolist()})
+    trajectory = solve(problem).trajectory
+    report = validate(trajectory, problem, engine="mujoco", control=control)
+    angles, critical = report.recording.wheel_angles, list(problem.goal.critical_indices)
+    np.testing.assert_allclose(angles[0], start, atol=0.02)
+    missed = (angles[-1] - np.asarray(problem.goal.wheels))[critical] / (2 * np.pi)
+    assert np.abs(missed - np.round(missed)).max() * 2 * np.pi < 0.1
+    assert np.abs(report.wheel_deviation[critical]).max() < 0.1
+    planned = start + trajectory.at(trajectory.duration).wheel_angles[0]
+    np.testing.assert_allclose(report.wheel_deviation, angles[-1] - planned, atol=0.01)
+
+
 def test_a_seed_below_zero_is_refused(scenario):
     with pytest.raises(ArgumentError, match="seed"):
         validate(solve(scenario).trajectory, scenario, engine="mujoco", control="pose", seed=-1)

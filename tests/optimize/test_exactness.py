@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from smdw_problems import SMDW, smdw_problem
 
-from trajopt.objectives.terminal import terminal_objective, with_free
+from trajopt.objectives.terminal import folded, terminal_objective, with_free
 from trajopt.optimize.base import Budget, Status
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import Lattice, lattice_points
@@ -86,6 +86,57 @@ def test_without_lattice_points_the_best_of_the_box_is_found(scenario):
     assert "no lattice point lies inside" in result.message
     grid = np.stack(np.meshgrid(*[np.linspace(a, b, 200) for a, b in box]), -1).reshape(-1, 2)
     assert result.fun <= objective.evaluate(grid).cost.min() + 1e-9
+
+
+def wheel_signs(objective, x):
+    """Signs of the critical wheels' errors at x, nearest whole turns taken off."""
+    part = objective.affine_part()
+    return tuple(np.sign(folded(part.matrix @ x + part.offset, part.period)).astype(int))
+
+
+@pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])
+def test_ipopt_alone_takes_errors_of_either_sign_as_costs(scenario, signs):
+    """In a box with no exact point, where the wheels' errors have the given signs, the program's
+    answer is as good as a fine grid's: |r| is bounded from both sides."""
+    objective = terminal_objective(scenario)
+    rng = np.random.default_rng(5)
+    for centre in rng.uniform(*objective.bounds.T, (1000, 2)):
+        box = centre[:, None] + 0.02 * np.array([-1.0, 1.0])
+        corners = np.stack(np.meshgrid(*box), -1).reshape(-1, 2)
+        if {wheel_signs(objective, x) for x in corners} == {signs}:
+            break
+    else:
+        raise AssertionError("no such box")
+    alone = Ipopt(starts=1, lattice_starts=0, polish=False)
+    result = minimize(objective, box, optimizer=alone, x0=centre)
+    grid = np.stack(np.meshgrid(*[np.linspace(a, b, 201) for a, b in box]), -1).reshape(-1, 2)
+    assert result.fun == pytest.approx(objective.evaluate(grid).cost.min(), abs=1e-6)
+    assert result.fun > 0.1
+
+
+@pytest.mark.parametrize("name", ["scenario_1_lateral", "table_5_3"])
+def test_the_symbolic_program_is_the_cost(name):
+    """Through actuators, at random points: with slacks = |residual| the program is feasible and
+    costs what the objective says; with any slack a little smaller it is not."""
+    objective, signs = through_actuators(name), []
+    for x in np.random.default_rng(1).uniform(*objective.bounds.T, (20, objective.dimension)):
+        slacks, turns = objective.slacks_at(x), objective.parameters_at(x)
+        signs.append([np.sign(np.squeeze(r)) for r in objective.residuals(x[:, None], turns)])
+
+        def program(slack, x=x, turns=turns):
+            found = objective.symbolic(np.concatenate([x, slack])[:, None], turns)
+            rows = np.ravel(found.constraints)
+            return float(np.squeeze(found.cost)), np.min([rows - found.lower, found.upper - rows])
+
+        cost, room = program(slacks)
+        assert cost == pytest.approx(objective.evaluate(x[None]).cost[0], rel=1e-9)
+        assert room >= -1e-12
+        for i in np.flatnonzero(slacks > 1e-6):
+            less = slacks.copy()
+            less[i] *= 0.99
+            assert program(less)[1] < 0
+    assert {1.0, -1.0} <= set(map(float, np.array(signs)[:, -1]))
+    assert {1.0, -1.0} <= set(map(float, np.array(signs)[:, 0]))
 
 
 def test_no_turn_between_start_and_goal_is_explained(scenario):

@@ -43,6 +43,46 @@ def test_odometry_follows_the_plan(plan: Plan) -> None:
     assert np.linalg.eigvalsh(estimate.covariance).min() > 0
 
 
+@pytest.mark.parametrize("turned", [(3.0, 3.0, 3.0, 3.0), (-2.0, 2.0, 2.0, -2.0), (4, -1, 2, 1)])
+@pytest.mark.parametrize("yaw", [0.4, -2.0])
+def test_doubt_of_the_yaw_becomes_doubt_of_the_place_as_poses_differ(
+    yaw: float, turned: tuple[float, ...]
+) -> None:
+    """Odometry from poses that differ as the covariance says: the means spread by d pose / d start
+    (difference quotients), so that the covariance grows by exactly what those give."""
+    start = np.array([0.3, -0.7, yaw])
+    root = np.array([[0.02, 0.0, 0.0], [0.01, 0.03, 0.0], [0.005, -0.01, 0.04]])
+
+    def moved(pose: np.ndarray, covariance: np.ndarray) -> Estimate:
+        return predict(Estimate(pose, covariance), ROBOT, np.array(turned, dtype=float))
+
+    slope = np.stack(
+        [
+            (moved(start + e, np.zeros((3, 3))).pose - moved(start - e, np.zeros((3, 3))).pose)
+            / 2e-5
+            for e in 1e-5 * np.eye(3)
+        ],
+        axis=1,
+    )
+    noise = moved(start, np.zeros((3, 3))).covariance
+    expected = slope @ root @ root.T @ slope.T + noise
+    assert np.abs(slope - np.eye(3)).max() > 0.05
+    np.testing.assert_allclose(moved(start, root @ root.T).covariance, expected, atol=1e-10)
+
+
+def test_a_place_measured_later_corrects_the_yaw_to_the_right_side() -> None:
+    """Two metres ahead with the yaw in doubt: found to the left of where odometry says, the robot
+    must have headed more to the left, by the angle at which it is seen from the start."""
+    estimate = Estimate(np.zeros(3), np.diag([1e-4, 1e-4, 0.1]) ** 2)
+    wheel = 2.0 / 0.098 / 20
+    for _ in range(20):
+        estimate = predict(estimate, ROBOT, np.full(4, wheel))
+    assert estimate.pose == pytest.approx([2.0, 0.0, 0.0], abs=1e-9)
+    doubt = np.array([2.0, 0.1, 0.0])  # yaw as good as unmeasured
+    found = correct(estimate, doubt, Sensors(position=0.001, yaw=10.0))
+    assert found.pose[2] == pytest.approx(0.05, abs=0.01)
+
+
 def test_wheel_path_agrees_with_the_exact_wheel_angles(plan: Plan) -> None:
     reference = reference_of(plan.trajectory, np.zeros(4))
     assert wheel_path(ROBOT, reference.pose)[-1] == pytest.approx(reference.wheels[-1], abs=2e-3)

@@ -67,6 +67,44 @@ def test_a_wheel_is_up_at_seven_tenths_of_the_step() -> None:
     assert not late.first_attempt
 
 
+def first_at(climb: Climb, share: float, *, late: int | None = None, sign: float = 1.0) -> bool:
+    """Whether it counts as the first attempt when the wheels come up ``share`` of a turn after they
+    have rolled their travel to the step; the wheel ``late`` alone 0.2 turns later."""
+    rise = np.array([0.036, 0.0, 0.036, 0.0])
+    found = recording(rise, 1.0)
+    up = int(np.argmax(found.wheel_heights[:, 0] > 0.1))
+    needed = np.zeros(4)
+    for i, travel in zip(climb.critical, climb.travel, strict=True):
+        needed[i] = travel / 0.098 + 2 * math.pi * (share + (0.2 if i == late else 0.0))
+    angles = np.outer(np.arange(201) / up, sign * needed) + np.array([3.0, -4.0, 5.0, 1.0])
+    return judge(climb, replace(found, wheel_angles=angles)).first_attempt
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("travel", [(0.02, 0.02), (0.3, 0.0)])
+def test_the_first_attempt_is_over_half_a_turn_after_meeting_the_step(
+    travel: tuple[float, float], sign: float
+) -> None:
+    """The other hub arrives then. What a wheel rolls before it meets the step does not count, nor
+    does the angle it starts with; sideways both leading wheels have to be that early, forward the
+    first one."""
+    sideways = replace(CLIMB, travel=travel)
+    forward = replace(sideways, motion=(1.0, 0.0))
+    for climb in (sideways, forward):
+        assert first_at(climb, 0.0, sign=sign)
+        assert first_at(climb, 0.48, sign=sign)
+        assert not first_at(climb, 0.52, sign=sign)
+        assert not first_at(climb, 0.9, sign=sign)
+    assert first_at(forward, 0.4, late=2, sign=sign)
+    assert not first_at(sideways, 0.4, late=2, sign=sign)
+    assert not first_at(forward, 0.4, late=0, sign=sign)
+
+
+def test_a_wheel_that_never_comes_up_had_no_first_attempt() -> None:
+    assert not judge(CLIMB, recording(np.array([0.036, 0.0, 0.0, 0.0]), 1.0)).first_attempt
+    assert not judge(CLIMB, recording(np.zeros(4), 0.0)).first_attempt
+
+
 def test_exploded_runs_are_counted_and_left_out() -> None:
     good, bad = (
         Outcome((True,) * 4, True, True, False, "", 0.0),
