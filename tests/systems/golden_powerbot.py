@@ -94,7 +94,7 @@ def _timed(task: PathProblem, variant: Literal["thesis", "physical"], engine: st
         task.spline,
         task.as_limits(variant=variant),
         robot=task.platform,
-        terrain=task.terrain,
+        ground=task.terrain,
         engine=engine,
     )
 
