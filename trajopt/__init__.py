@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from trajopt.refine.jerk import limit_jerk
     from trajopt.refine.path import optimize_path
     from trajopt.refine.profile import follow
-    from trajopt.robots.loc8 import loc8
-    from trajopt.robots.powerbot import powerbot
+    from trajopt.robots.robot import Robot, robot, robot_names
     from trajopt.simulate.check import ValidationReport
     from trajopt.sweeps.sweeps import sweep
     from trajopt.systems.smdw.planner import plan_climb
@@ -59,6 +58,7 @@ _HOME = {
     "Path": "trajopt.paths.path",
     "Problem": "trajopt.problem.search",
     "ProblemError": "trajopt.errors",
+    "Robot": "trajopt.robots.robot",
     "SimulationError": "trajopt.errors",
     "Slip": "trajopt.limits.slip",
     "Solution": "trajopt.pipeline",
@@ -78,11 +78,11 @@ _HOME = {
     "load_maneuver": "trajopt.systems.smdw.problem",
     "load_path_problem": "trajopt.problem.given_path",
     "load_problem": "trajopt.problem.search",
-    "loc8": "trajopt.robots.loc8",
     "minimize": "trajopt.optimize.search",
     "optimize_path": "trajopt.refine.path",
     "plan_climb": "trajopt.systems.smdw.planner",
-    "powerbot": "trajopt.robots.powerbot",
+    "robot": "trajopt.robots.robot",
+    "robot_names": "trajopt.robots.robot",
     "solve": "trajopt.pipeline",
     "sweep": "trajopt.sweeps.sweeps",
     "time_path": "trajopt.pipeline",
@@ -101,6 +101,7 @@ __all__ = [
     "Path",
     "Problem",
     "ProblemError",
+    "Robot",
     "SimulationError",
     "Slip",
     "Solution",
@@ -120,11 +121,11 @@ __all__ = [
     "load_maneuver",
     "load_path_problem",
     "load_problem",
-    "loc8",
     "minimize",
     "optimize_path",
     "plan_climb",
-    "powerbot",
+    "robot",
+    "robot_names",
     "solve",
     "sweep",
     "time_path",

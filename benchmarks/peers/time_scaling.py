@@ -28,7 +28,8 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
 from trajopt.report.timing import draw_growth, growth_exponent
-from trajopt.robots.platform import Body, Platform, differential_platform
+from trajopt.robots.robot import Robot
+from trajopt.robots.robot import robot as shipped
 from trajopt.timing.bounds import bounds_profile
 from trajopt.timing.compiled import compiled_profile, fastest_profiles
 from trajopt.timing.scaling import time_scale
@@ -71,20 +72,19 @@ def main() -> None:
     )
 
 
-def robot() -> Platform:
-    """A differential drive with casters, sizes like PowerBot's (SOURCES 004); half track and mass
-    chosen."""
-    nan = float("nan")
-    body = Body(
-        120.0,
-        8.0,
-        (-0.132, 0.0, 0.215),
-        ((0.0, 0.2), (0.0, -0.2), (-0.35, 0.2), (-0.35, -0.2)),
-        (nan,) * 4,
-        (True, True, False, False),
-    )
-    return differential_platform(
-        "differential", half_track=0.2, radius=0.12, body=body, footprint=()
+def robot() -> Robot:
+    """A differential drive with castors, PowerBot with half track, mass and inertia chosen."""
+    return shipped(
+        "powerbot",
+        {
+            "body.mass": 120.0,
+            "body.yaw_inertia": 8.0,
+            "wheels.left.position": [0.0, 0.2],
+            "wheels.right.position": [0.0, -0.2],
+            "wheels.all.radius": 0.12,
+            "wheels.castor-left.position": [-0.31, 0.2],
+            "wheels.castor-right.position": [-0.31, -0.2],
+        },
     )
 
 

@@ -40,6 +40,7 @@ from benchmarks.theses.asoc_tables_tracking import (
     runs,
     tables_9_and_10,
 )
+from benchmarks.theses.textbook import TEXTBOOK
 from trajopt.arrays import Array
 from trajopt.errors import TrajoptError
 from trajopt.optimize.base import Budget, Optimizer
@@ -50,11 +51,10 @@ from trajopt.optimize.search import minimize, optimizer_names
 from trajopt.report.platform_picture import platform_figure
 from trajopt.report.style import in_style, save_figure
 from trajopt.robots.mobility import mobility_of
-from trajopt.robots.named import NAMED
 from trajopt.systems.asoc.design import TERMS, AsocDesign, Model, best_width, full_factorial
 from trajopt.systems.asoc.isotropy import Contact, best_ratio, mean_isotropy, spread_modules
 from trajopt.systems.asoc.modules import (
-    asoc_platform,
+    asoc_robot,
     largest_pivot,
     link_velocities,
     wheel_steering,
@@ -87,12 +87,12 @@ def mean(places: Array, ratio: float, effort: Effort, **options: object) -> floa
 
 def mobility() -> ResultTable:
     rows = []
-    for name, make in NAMED.items():
-        m = mobility_of(make())
+    for name, robot in TEXTBOOK.items():
+        m = mobility_of(robot)
         rows.append((name, str(m.mobility), str(m.steerability), str(m.manoeuvrability)))
     return ResultTable(
-        "Mobility of the textbook platforms (lecture 003)",
-        ("platform", "mobility", "steerability", "manoeuvrability"),
+        "Mobility of the textbook robots (lecture 003)",
+        ("robot", "mobility", "steerability", "manoeuvrability"),
         rows,
     )
 
@@ -456,7 +456,7 @@ def draw(
         )  # modules at rest against the body
         save_figure(
             platform_figure(
-                asoc_platform(GEOMETRY), steering=wheel_steering(GEOMETRY, trailing), twist=twist
+                asoc_robot(GEOMETRY), steering=wheel_steering(GEOMETRY, trailing), twist=twist
             ),
             FIGURES / "platform.png",
         )

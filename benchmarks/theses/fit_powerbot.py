@@ -22,7 +22,7 @@ import scipy.optimize
 
 from trajopt.arrays import Array
 from trajopt.paths.path import Path
-from trajopt.robots.powerbot import FRICTION
+from trajopt.systems.powerbot.constants import FRICTION
 from trajopt.systems.powerbot.limits import GRAVITY
 
 ROOT = FilePath(__file__).resolve().parents[2]

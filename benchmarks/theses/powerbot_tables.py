@@ -27,17 +27,13 @@ from trajopt.problem.given_path import PathProblem, load_path_problem
 from trajopt.refine.jerk import limit_jerk
 from trajopt.refine.path import corridor, optimize_path
 from trajopt.refine.profile import follow
-from trajopt.robots.platform import STANDARD_GRAVITY
-from trajopt.robots.powerbot import (
-    COG_HEIGHT,
-    COG_TO_CASTER_AXLE,
-    COG_TO_DRIVE_AXLE,
+from trajopt.robots.robot import STANDARD_GRAVITY, robot
+from trajopt.systems.powerbot.constants import (
     FRICTION,
     LARGEST_SPEED,
     REACTION_TIME,
     SCAN_TIME,
     SONAR_RANGE,
-    powerbot,
 )
 from trajopt.systems.powerbot.limits import thesis_slip_acceleration, thesis_tip_acceleration
 from trajopt.timing.linear import linear_factor
@@ -46,6 +42,11 @@ from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import lay_over
 
 DATA = ROOT / "tests" / "data" / "powerbot"
+# balancing castors: one point of support behind
+BALANCED = robot(
+    "powerbot",
+    {"wheels.castor-left.position": [-0.31, 0.0], "wheels.castor-right.position": [-0.31, 0.0]},
+)
 TIMED = (1, 2, 4, 5)  # experiments that the thesis scales linearly
 SLOPES = (0.0, 5.99, -5.99)  # deg; Experiment 4's ramp
 CORRIDOR = 0.5  # m to either side of a knot, chosen: inside a hallway
@@ -144,10 +145,12 @@ def braking_limits() -> ResultTable:
 def slip_range(slope: float) -> tuple[float, float]:
     """Accelerating and braking limit of the drive wheels' friction on a straight slope (rad), m/s^2
     > 0."""
-    axle, h = COG_TO_DRIVE_AXLE + COG_TO_CASTER_AXLE, COG_HEIGHT
+    body = BALANCED.body
+    axle, h = body.contacts[0][0] - body.contacts[2][0], body.cog[2]
+    behind = body.cog[0] - body.contacts[2][0]  # of the castors behind the centre of gravity
     normal, along = STANDARD_GRAVITY * math.cos(slope), STANDARD_GRAVITY * math.sin(slope)
-    push = FRICTION * COG_TO_CASTER_AXLE * normal / (axle + FRICTION * h)
-    hold = FRICTION * COG_TO_CASTER_AXLE * normal / (axle - FRICTION * h)
+    push = FRICTION * behind * normal / (axle + FRICTION * h)
+    hold = FRICTION * behind * normal / (axle - FRICTION * h)
     return push - along, hold + along
 
 
@@ -359,7 +362,7 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
     from trajopt.systems.powerbot.pictures import draw_replan
 
     FIGURES.mkdir(parents=True, exist_ok=True)
-    task, robot = problem(3), powerbot(caster_half_track=0.0)
+    task, robot = problem(3), BALANCED
     plan = time_scale(task.spline, with_friction(task, BENDS), robot=robot)
     where = course(plan, robot, limits=with_friction(task, BRAKES))
     rows, pictures = [], []
@@ -482,7 +485,7 @@ def following_in_physics() -> ResultTable:
     from trajopt.systems.powerbot.differential import Floor, drive_in_pybullet
     from trajopt.systems.powerbot.model import powerbot_drive
 
-    task, robot = problem(6), powerbot(caster_half_track=0.0)
+    task, robot = problem(6), BALANCED
     profile = task.speed_profile()
     assert profile is not None
     rows = []
@@ -536,7 +539,7 @@ def physics(numbers: Sequence[int]) -> ResultTable:
     from trajopt.systems.powerbot.differential import Floor, drive_in_pybullet
     from trajopt.systems.powerbot.model import powerbot_drive
 
-    robot = powerbot(caster_half_track=0.0)  # balancing casters: one point of support behind
+    robot = BALANCED
     with (DATA / "measured.csv").open(encoding="utf-8") as file:
         measured = list(csv.DictReader(line for line in file if not line.startswith("#")))
     rows = []

@@ -21,12 +21,12 @@ from rich.progress import track
 from rich.table import Table
 
 from benchmarks.common import provenance
+from trajopt.robots.robot import robot
 from trajopt.simulate.engine import ENGINES, Command, Recording, SimRobot, make_engine
 from trajopt.simulate.rollers import SHAPES, Shape
 from trajopt.simulate.scene import Scene
 from trajopt.simulate.straight import DIRECTIONS, deviation, straight_command
-from trajopt.systems.smdw.loc8_model import loc8_mecanum
-from trajopt.systems.smdw.wheel import loc8_smdw
+from trajopt.systems.smdw.loc8_model import roller_robot
 
 DISTANCE = 5.0  # m, SMDW thesis section 5.3
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0)  # km/h, SMDW thesis Table 5.1
@@ -66,7 +66,8 @@ class Row:
 
 def build(wheel: str, shape: Shape) -> SimRobot:
     """LOC8 on the wheels called ``wheel`` with rollers of ``shape``."""
-    return loc8_mecanum(shape=shape) if wheel == "Mecanum" else loc8_smdw(shape=shape)
+    name = "loc8" if wheel == "Mecanum" else "loc8-smdw"
+    return roller_robot(robot(name, {"wheels.all.rollers.shape": shape}))
 
 
 def cases(speeds: Sequence[float], engines: Sequence[str]) -> list[Case]:

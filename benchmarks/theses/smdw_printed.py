@@ -21,7 +21,7 @@ import numpy as np
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from benchmarks.theses.climb import NAMES, THESIS
 from trajopt.report.intervals import wilson
-from trajopt.robots.loc8 import HALF_TRACK, HALF_WHEELBASE
+from trajopt.robots.robot import robot
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.systems.smdw.climb import Climb, Outcome, judge, record_climb
 from trajopt.systems.smdw.planner import Configuration, configurations
@@ -99,10 +99,10 @@ def moved_up(climb: Climb) -> Climb:
     """The yaw set right, and the robot moved so that its leading wheel's centre is as near to the
     step as before."""
     x, y, yaw = climb.pose
-    before = HALF_WHEELBASE * abs(math.cos(yaw)) - HALF_TRACK * math.sin(
-        yaw
-    )  # ahead of the robot's centre
-    return replace(climb, pose=(x + before - HALF_TRACK, y, SET_YAW))
+    half_base, half_track = robot("loc8-smdw").wheels[0].position
+    # ahead of the robot's centre
+    before = half_base * abs(math.cos(yaw)) - half_track * math.sin(yaw)
+    return replace(climb, pose=(x + before - half_track, y, SET_YAW))
 
 
 def printed_climb(

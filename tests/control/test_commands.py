@@ -20,7 +20,7 @@ from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
-from trajopt.robots.powerbot import powerbot
+from trajopt.robots.robot import robot as shipped
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 
@@ -30,7 +30,7 @@ def plan() -> Trajectory:
     path = Path.through(
         [[0, 0], [2, 0.5], [4, -0.3], [6, 0.4]], start_direction=[1, 0], end_direction=[1, 0]
     )
-    return time_scale(path, [Speed(0.8), Acceleration(0.5, 1.0)], robot=powerbot())
+    return time_scale(path, [Speed(0.8), Acceleration(0.5, 1.0)], robot=shipped("powerbot"))
 
 
 def test_mean_commands_end_at_the_planned_wheel_angles(plan: Trajectory) -> None:
@@ -39,7 +39,7 @@ def test_mean_commands_end_at_the_planned_wheel_angles(plan: Trajectory) -> None
         turned = (
             np.array([orders.left.sum(), orders.right.sum()])
             * sample_time
-            / powerbot().wheels[0].radius
+            / shipped("powerbot").wheels[0].radius
         )
         assert turned == pytest.approx(plan.at(plan.duration).wheel_angles[0], rel=1e-9)
 
@@ -51,7 +51,7 @@ def test_drive_of_a_circle_is_exact(plan: Trajectory) -> None:
         orders.times, np.full(len(orders.times), 0.3), np.full(len(orders.times), 0.5), 0.5
     )
     t = np.linspace(0, circle.duration, 33)
-    pose = driven(circle, powerbot(), (1.0, 2.0, 0.3), t)
+    pose = driven(circle, shipped("powerbot"), (1.0, 2.0, 0.3), t)
     w, v = 0.2 / (2 * 0.268), 0.4
     yaw = 0.3 + w * t
     assert pose[:, 2] == pytest.approx(yaw)
@@ -106,7 +106,7 @@ def test_tracker_corrects_start_errors_and_drift(plan: Trajectory) -> None:
         track(
             plan,
             tracker,
-            powerbot(),
+            shipped("powerbot"),
             sample_time=0.05,
             disturbance=disturbance,
             rng=np.random.default_rng(3),
@@ -123,7 +123,7 @@ def test_tracker_without_errors_changes_nothing(plan: Trajectory) -> None:
         track(
             plan,
             tracker,
-            powerbot(),
+            shipped("powerbot"),
             sample_time=0.02,
             disturbance=Disturbance(),
             rng=np.random.default_rng(0),

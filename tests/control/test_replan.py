@@ -29,7 +29,7 @@ from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
-from trajopt.robots.powerbot import powerbot
+from trajopt.robots.robot import robot as shipped
 from trajopt.timing.scaling import time_scale
 
 SPAN = 12.0  # s after which the way is free in every encounter
@@ -38,7 +38,7 @@ SPAN = 12.0  # s after which the way is free in every encounter
 @pytest.fixture(scope="module")
 def bend() -> Course:
     path = Path.through([[0, 0], [2, 0.5], [4, -0.3]], start_direction=[1, 0], end_direction=[1, 0])
-    robot = powerbot()
+    robot = shipped("powerbot")
     return course(
         time_scale(path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.332)], robot=robot), robot
     )
@@ -265,7 +265,7 @@ def test_a_body_beside_its_plan_needs_the_allowance(bend: Course) -> None:
 def test_a_course_brakes_with_the_limits_it_is_given() -> None:
     """A plan that uses all the friction in a bend leaves no braking; one timed with less does."""
     path = Path.through([[0, 0], [2, 0], [2.6, 0.6], [2.6, 2.5]])
-    robot = powerbot()
+    robot = shipped("powerbot")
     limits = [[Speed(2.1), Acceleration(0.55, 7.8), Slip(share * 0.332)] for share in (0.6, 1.0)]
     fast, slow = (time_scale(path, used, robot=robot) for used in reversed(limits))
     assert course(slow, robot, limits=limits[1]).braking.min() > 0.5

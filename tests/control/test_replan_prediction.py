@@ -20,7 +20,7 @@ from trajopt.control.replan import (
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
-from trajopt.robots.powerbot import powerbot
+from trajopt.robots.robot import robot as shipped
 from trajopt.timing.scaling import time_scale
 
 WIDE = Sensor(20.0, 0.1, 0.1)  # sees everything
@@ -28,7 +28,7 @@ BRAKING = 1.2  # m/s^2
 
 
 def motion_on(path: Path) -> Course:
-    robot = powerbot()
+    robot = shipped("powerbot")
     return course(time_scale(path, [Speed(1.0), Acceleration(0.8, BRAKING)], robot=robot), robot)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.theses.textbook import planar, wheel
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.forces import contact_loads, specific_force
@@ -17,23 +18,36 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
-from trajopt.robots.loc8 import loc8
-from trajopt.robots.platform import STANDARD_GRAVITY, Body, Platform, differential_platform
+from trajopt.robots.robot import STANDARD_GRAVITY, Body, Robot, robot
 
 G, NAN = STANDARD_GRAVITY, float("nan")
 MU, H, FRONT, REAR, TRACK = 0.332, 0.215, 0.132, 0.218, 0.2  # PowerBot-like: SOURCES 004
 
 
-def powerbot_like(cog: tuple[float, float, float] = (0.0, 0.0, H)) -> Platform:
+def powerbot_like(cog: tuple[float, float, float] = (0.0, 0.0, H)) -> Robot:
     """Origin at the centre of gravity by default, as the formulas of SOURCES 004 have it."""
-    contacts = ((FRONT, TRACK), (FRONT, -TRACK), (-REAR, TRACK), (-REAR, -TRACK))
-    body = Body(120.0, 8.0, cog, contacts, (NAN,) * 4, (True, True, False, False))
-    return differential_platform(
-        "powerbot-like",
-        half_track=TRACK,
-        radius=0.12,
-        body=body,
-        footprint=((0.3, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.3, -0.3)),
+    size = {"radius": 0.12, "width": 0.05, "mass": 2.0}
+    wheels = [
+        {"name": name, "kind": "fixed", "position": [FRONT, y], **size}
+        for name, y in (("left", TRACK), ("right", -TRACK))
+    ]
+    wheels += [
+        {"name": name, "kind": "castor", "position": [0.05 - REAR, y], "trail": 0.05, **size}
+        for name, y in (("castor-left", TRACK), ("castor-right", -TRACK))
+    ]
+    return Robot.of(
+        {
+            "name": "powerbot-like",
+            "body": {
+                "mass": 120.0,
+                "cog": cog,
+                "yaw_inertia": 8.0,
+                "chassis": [0.8, 0.6, 0.2],
+                "clearance": 0.1,
+            },
+            "wheels": wheels,
+            "motors": [{"name": "drives", "wheels": ["left", "right"], "torque": 9.0}],
+        }
     )
 
 
@@ -124,43 +138,43 @@ def test_specific_force_is_the_acceleration_of_the_centre_of_gravity(path, cog):
         np.testing.assert_allclose((force.a * u + force.b * x + force.c)[0], expected, atol=1e-5)
 
 
-@pytest.mark.parametrize(("path", "robot"), [(CURVE, powerbot_like()), (TURNING, loc8())])
-def test_wheel_rows_are_the_derivatives_of_wheel_rates(path, robot):
+@pytest.mark.parametrize(("path", "mover"), [(CURVE, powerbot_like()), (TURNING, robot("loc8"))])
+def test_wheel_rows_are_the_derivatives_of_wheel_rates(path, mover):
     s0, u, x = 1.3, 0.6, 0.9
     h, s = motion(s0, u, x)
     speed = np.sqrt(x) + u * np.arange(-2, 3) * h
-    rates = sample_path(path, s).twist @ robot.inverse.T * speed[:, None]
+    rates = sample_path(path, s).twist @ mover.inverse.T * speed[:, None]
     derivative = (rates[0] - 8 * rates[1] + 8 * rates[3] - rates[4]) / (12 * h)
     here = sample_path(path, np.array([s0]))
-    rows = WheelAcceleration(1.0).rows(here, robot)
-    wheels = len(robot.wheels)
+    rows = WheelAcceleration(1.0).rows(here, mover)
+    wheels = len(mover.wheels)
     np.testing.assert_allclose((rows.a * u + rows.b * x)[0, :wheels], derivative, rtol=1e-6)
-    top = WheelSpeed(10.0).rows(here, robot).sd2_max[0]
-    assert np.abs(here.twist[0] @ robot.inverse.T).max() * np.sqrt(top) == pytest.approx(10.0)
+    top = WheelSpeed(10.0).rows(here, mover).sd2_max[0]
+    assert np.abs(here.twist[0] @ mover.inverse.T).max() * np.sqrt(top) == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("make", [WheelSpeed, WheelAcceleration])
 def test_one_number_a_wheel_binds_each_wheel_at_its_own(make):
     """Equal numbers are one number; a wheel with half of it binds as half for all does there."""
-    robot, samples = loc8(), sample_path(CURVE, np.linspace(0, CURVE.length, 9))
-    one, same = (make(v).rows(samples, robot) for v in (4.0, (4.0,) * 4))
+    mover, samples = robot("loc8"), sample_path(CURVE, np.linspace(0, CURVE.length, 9))
+    one, same = (make(v).rows(samples, mover) for v in (4.0, (4.0,) * 4))
     np.testing.assert_array_equal(one.sd2_max, same.sd2_max)
     np.testing.assert_array_equal(one.a, same.a)
     for i in range(4):
         values = [np.inf] * 4
         values[i] = 2.0
-        rows = make(tuple(values)).rows(samples, robot)
-        rates = np.abs(samples.twist @ robot.inverse[i])
+        rows = make(tuple(values)).rows(samples, mover)
+        rates = np.abs(samples.twist @ mover.inverse[i])
         if make is WheelSpeed:
             np.testing.assert_allclose(rows.sd2_max, (2.0 / rates) ** 2)
         else:
-            np.testing.assert_allclose(rows.a[:, i], samples.twist @ robot.inverse[i])
-            np.testing.assert_allclose(rows.b[:, 4 + i], -samples.twist_rate @ robot.inverse[i])
+            np.testing.assert_allclose(rows.a[:, i], samples.twist @ mover.inverse[i])
+            np.testing.assert_allclose(rows.b[:, 4 + i], -samples.twist_rate @ mover.inverse[i])
             assert not rows.a[:, [j for j in range(8) if j % 4 != i]].any()
             assert (rows.c == 2.0).all()
     for wrong in ((1.0, 2.0), (1.0,) * 5):
         with pytest.raises(ArgumentError, match="one a wheel"):
-            make(wrong).rows(samples, robot)
+            make(wrong).rows(samples, mover)
     for wrong in ((), (1.0, 0.0, 1.0, 1.0), (np.inf,) * 4):
         with pytest.raises(ArgumentError, match="> 0"):
             make(wrong)
@@ -196,13 +210,13 @@ def test_turn_on_the_spot_counts_no_translation():
 
 def test_four_wheel_loads_balance_force_and_moments():
     rng = np.random.default_rng(3)
-    robot = loc8()
+    mover = robot("loc8")
     samples = sample_path(TURNING, rng.uniform(0.1, TURNING.length - 0.1, 30))
     u, x = rng.uniform(-2, 2, (30, 1)), rng.uniform(0, 2, (30, 1))
-    loads, force = contact_loads(samples, robot.body), specific_force(samples, robot.body)
+    loads, force = contact_loads(samples, mover.body), specific_force(samples, mover.body)
     n = loads.a * u + loads.b * x + loads.c
     f = force.a * u + force.b * x + force.c
-    arms, h = np.array(robot.body.contacts), robot.body.cog[2]
+    arms, h = np.array(mover.body.contacts), mover.body.cog[2]
     np.testing.assert_allclose(n.sum(axis=1), f[:, 2], atol=1e-9)
     np.testing.assert_allclose(n @ arms[:, 0], -h * f[:, 0], atol=1e-9)
     np.testing.assert_allclose(n @ arms[:, 1], -h * f[:, 1], atol=1e-9)
@@ -213,21 +227,21 @@ def test_four_wheel_loads_balance_force_and_moments():
 def test_mecanum_slip_by_hand():
     """Forward push on level ground: every roller carries a force of m a / (4 cos 45), loads shift
     by h a."""
-    robot, mu, push = loc8(), 0.4, 1.0
+    mover, mu, push = robot("loc8"), 0.4, 1.0
     straight = Path.through([[0, 0], [2, 0]], heading=[0, 0], turning_length=0.5)
-    rows = Slip(mu).rows(sample_path(straight, np.array([1.0])), robot)
+    rows = Slip(mu).rows(sample_path(straight, np.array([1.0])), mover)
     used = (rows.a * push - rows.c)[0].reshape(4, 2).max(axis=1)
-    shift = robot.body.cog[2] * push / (4 * 0.376)
+    shift = mover.body.cog[2] * push / (4 * 0.376)
     loads = G / 4 + np.array([-shift, -shift, shift, shift])
     np.testing.assert_allclose(used, push / (4 * np.cos(np.pi / 4)) - mu * loads, atol=1e-9)
 
 
 def test_per_wheel_slip_is_stricter_in_a_curve_and_equal_on_a_straight():
-    robot = powerbot_like(cog=(-0.1, 0.0, 0.3))
+    mover = powerbot_like(cog=(-0.1, 0.0, 0.3))
     curve = sample_path(CURVE, np.linspace(0.2, CURVE.length - 0.2, 50))
 
     def top_speed(limit: Slip) -> np.ndarray:
-        rows = limit.rows(curve, robot)
+        rows = limit.rows(curve, mover)
         return np.min(
             np.where(rows.b > 1e-9, rows.c / np.where(rows.b > 1e-9, rows.b, 1), np.inf), axis=1
         )
@@ -236,7 +250,7 @@ def test_per_wheel_slip_is_stricter_in_a_curve_and_equal_on_a_straight():
     straight = sample_path(slope_path(0.1), np.array([1.0]))
     top = []
     for limit in (Slip(0.5), Slip(0.5, per_wheel=True)):
-        rows = limit.rows(straight, robot)
+        rows = limit.rows(straight, mover)
         top.append(np.min(rows.c[rows.a > 1e-9] / rows.a[rows.a > 1e-9]))
     assert top[0] == pytest.approx(top[1], rel=1e-9)
 
@@ -297,8 +311,7 @@ def test_robots_that_a_limit_cannot_use_are_refused():
             limit.rows(samples, None)
     with pytest.raises(ArgumentError, match="support"):
         Tip(reserve=0.15).rows(samples, powerbot_like())
-    line = Body(1.0, 1.0, (0, 0, 0.1), ((1, 0), (0, 0), (-1, 0)), (NAN,) * 3, (True,) * 3)
-    robot = differential_platform("line", half_track=0.2, radius=0.1, body=line, footprint=())
+    line = planar("line", *(wheel("fixed", x, 0.0) for x in (1.0, 0.0, -1.0)))
     for limit in (Slip(0.3), Tip()):
         with pytest.raises(ArgumentError, match="line"):
-            limit.rows(samples, robot)
+            limit.rows(samples, line)

@@ -8,8 +8,8 @@ import pytest
 from trajopt.limits.slip import Slip
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
-from trajopt.robots.loc8 import HALF_TRACK, HALF_WHEELBASE, loc8
-from trajopt.robots.platform import STANDARD_GRAVITY, Platform
+from trajopt.robots.robot import STANDARD_GRAVITY, Robot
+from trajopt.robots.robot import robot as shipped
 
 G, MU = STANDARD_GRAVITY, 0.4
 TURNING = Path.through(
@@ -18,7 +18,7 @@ TURNING = Path.through(
 
 
 @pytest.mark.parametrize(
-    ("heading", "arm"), [(0.0, HALF_WHEELBASE), (-np.pi / 2, HALF_TRACK)], ids=["ahead", "sideways"]
+    ("heading", "arm"), [(0.0, 0.376), (-np.pi / 2, 0.316)], ids=["ahead", "sideways"]
 )
 def test_pushing_and_braking_slip_at_the_same_force(heading: float, arm: float) -> None:
     """From rest on level ground, a roller robot slips alike ahead, back, left and right.
@@ -26,7 +26,7 @@ def test_pushing_and_braking_slip_at_the_same_force(heading: float, arm: float) 
     Every roller passes m |a| / (4 cos 45), and the pair that loses load keeps m (g - h |a| / arm) /
     4: so |a| = mu g / (sqrt(2) + mu h / arm).
     """
-    robot = loc8()
+    robot = shipped("loc8")
     straight = Path.through([[0, 0], [2, 0]], heading=[heading, heading], turning_length=0.5)
     rows = Slip(MU).rows(sample_path(straight, np.array([1.0])), robot)
     pushing, slowing = rows.a > 1e-9, rows.a < -1e-9
@@ -35,7 +35,7 @@ def test_pushing_and_braking_slip_at_the_same_force(heading: float, arm: float) 
     assert np.max(rows.c[slowing] / rows.a[slowing]) == pytest.approx(-expected, rel=1e-9)
 
 
-def driven(path: Path, robot: Platform, s0: float, u: float, x: float) -> tuple[np.ndarray, float]:
+def driven(path: Path, robot: Robot, s0: float, u: float, x: float) -> tuple[np.ndarray, float]:
     """Acceleration (2,) of the body's origin, in its own axes, and yaw acceleration: central
     differences of the poses of the motion with s'^2 = x and s'' = u at s0."""
     assert robot.body.cog[:2] == (0.0, 0.0)
@@ -54,7 +54,7 @@ def driven(path: Path, robot: Platform, s0: float, u: float, x: float) -> tuple[
 def test_roller_forces_move_the_body_as_it_moves(s0: float, u: float, x: float) -> None:
     """The least forces along the rollers that give the motion its force *and* its yaw moment,
     against the loads of four springs of the same stiffness under a rigid body."""
-    robot = loc8()
+    robot = shipped("loc8")
     body = robot.body
     (ax, ay), turning = driven(TURNING, robot, s0, u, x)
     axes = np.array([[np.cos(g), np.sin(g)] for g in body.roller_axis])

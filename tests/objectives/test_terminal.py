@@ -23,7 +23,7 @@ from trajopt.objectives.terminal import (
     with_free,
 )
 from trajopt.optimize.lattice import lattice_points
-from trajopt.robots.loc8 import loc8
+from trajopt.robots.robot import robot as shipped
 
 DATA = ROOT / "tests/data/smdw"
 PRINT_ROUNDING = 0.0015
@@ -187,9 +187,9 @@ def test_matrix_does_not_depend_on_duration(scenario):
 def test_lattice_is_exact_in_the_theses_convention_too(problem):
     """The thesis's kinematics (y right, yaw counter-clockwise) is ours with the y column
     negated."""
-    mirrored = loc8().inverse * [1, -1, 1]
+    mirrored = shipped("loc8").inverse * [1, -1, 1]
     thesis = TerminalObjective(
-        problem, loc8(), kinematics=Kinematics(mirrored, np.linalg.pinv(mirrored))
+        problem, shipped("loc8"), kinematics=Kinematics(mirrored, np.linalg.pinv(mirrored))
     )
     points, _ = lattice_points(thesis.affine_part(), thesis.bounds)
     assert 1 <= len(points) <= 15

@@ -16,7 +16,7 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.paths.path import Path
 from trajopt.refine.path import _linearised, corridor, optimize_path
-from trajopt.robots.powerbot import powerbot
+from trajopt.robots.robot import robot as shipped
 from trajopt.timing.scaling import time_scale
 
 CORNER = Path.through(
@@ -36,7 +36,7 @@ CORNER = Path.through(
 def test_one_knot_goes_where_a_scan_finds_the_least_time(limits: Sequence[Limit]) -> None:
     """The fastest bend is neither the given one nor the shortest: the program has to weigh the
     lengths against every limit's rows, as they change with the knot."""
-    build, robot = corridor(CORNER), powerbot()
+    build, robot = corridor(CORNER), shipped("powerbot")
     places = np.linspace(-0.7, 0.7, 29)
     paths = [build(np.array([z])) for z in places]
     times = [time_scale(p, limits, robot=robot).duration for p in paths]
@@ -58,7 +58,7 @@ def test_what_the_program_is_made_of_changes_as_its_derivatives_say(part: str) -
     here, move = np.array([0.1, -0.2]), np.array([6e-4, -8e-4])
 
     def at(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        table = _linearised(corridor(hill), lambda _: limits, powerbot(), z, u)
+        table = _linearised(corridor(hill), lambda _: limits, shipped("powerbot"), z, u)
         value, slope = getattr(table, part)
         return value, slope
 

@@ -18,7 +18,7 @@ from trajopt.report.convergence_picture import convergence_figure
 from trajopt.report.ground_plan import obstacle_strip, outline
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.profile_picture import band_times, limit_use, profile_figure
-from trajopt.robots.loc8 import loc8
+from trajopt.robots.robot import robot as shipped
 from trajopt.simulate.check import ValidationReport
 
 
@@ -145,18 +145,18 @@ def test_profile_marks_broken_limits(through_actuators: Solution) -> None:
 
 
 def test_obstacle_touches_the_robot_at_the_goal(exact: Solution) -> None:
-    found = obstacle_strip(exact.problem, loc8(), 1.2)
+    found = obstacle_strip(exact.problem, shipped("loc8"), 1.2)
     assert found is not None
     strip, yaw = found
     assert (
         yaw == exact.problem.start.pose[2]
     )  # the scenarios meet a step across their start heading
-    reach = outline(loc8(), np.asarray(exact.problem.goal.pose))[:, 0].max()
+    reach = outline(shipped("loc8"), np.asarray(exact.problem.goal.pose))[:, 0].max()
     assert strip[:, 0].min() == pytest.approx(reach)
     flat = exact.problem.replace({"scene.obstacle_height": 0.0})
-    assert obstacle_strip(flat, loc8(), 1.2) is None
+    assert obstacle_strip(flat, shipped("loc8"), 1.2) is None
     behind = exact.problem.replace({"start.pose": [0.0, 0.0, 3.0]})
-    meets = obstacle_strip(behind, loc8(), 1.2)
+    meets = obstacle_strip(behind, shipped("loc8"), 1.2)
     assert meets is not None
     assert meets[1] == pytest.approx(
         exact.problem.goal.pose[2] + np.pi / 2

@@ -15,7 +15,7 @@ from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
 from trajopt.report.timing import draw_growth, growth_exponent
-from trajopt.robots.powerbot import powerbot
+from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.pictures import draw_path, draw_profiles, draw_replan, draw_safe_speed
 from trajopt.timing.scaling import time_scale
 
@@ -41,7 +41,7 @@ def test_exponent_needs_pairs_of_positive_numbers(
 
 
 def test_pictures_show_something(tmp_path: FilePath) -> None:
-    robot = powerbot()
+    robot = shipped("powerbot")
     path = Path.through([[0, 0], [2, 0.3], [4, 0]], start_direction=[1, 0], end_direction=[1, 0])
     plan = time_scale(path, [Speed(0.8), Acceleration(0.5, 1.0)], robot=robot)
     where, sensor = course(plan, robot), Sensor(2.0, 0.1, 0.1)

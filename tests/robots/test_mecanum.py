@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 
 from trajopt.errors import ArgumentError
 from trajopt.robots.actuator import Actuator
-from trajopt.robots.loc8 import HALF_TRACK, HALF_WHEELBASE, WHEEL_RADIUS, loc8
+from trajopt.robots.robot import robot
 from trajopt.robots.wheel import Wheel, WheelKind
 
-L = HALF_WHEELBASE + HALF_TRACK
+L, WHEEL_RADIUS = 0.376 + 0.316, 0.098  # m
 # Thesis 000, inverse kinematics as printed: y points right there, yaw is counter-clockwise.
 PRINTED = np.array([[1, 1, -L], [1, -1, L], [1, -1, -L], [1, 1, L]]) / WHEEL_RADIUS
 MIRROR = np.diag([1.0, -1.0, 1.0])  # y right <-> y left
 
 
 def test_printed_inverse_is_ours_with_y_mirrored():
-    np.testing.assert_allclose(loc8().inverse @ MIRROR, PRINTED, atol=1e-12)
+    np.testing.assert_allclose(robot("loc8").inverse @ MIRROR, PRINTED, atol=1e-12)
 
 
 def test_printed_forward_is_ours_with_y_mirrored():
@@ -27,16 +27,16 @@ def test_printed_forward_is_ours_with_y_mirrored():
     printed = (
         WHEEL_RADIUS / 4 * np.array([[1, 1, 1, 1], [1, -1, -1, 1], [-1 / L, 1 / L, -1 / L, 1 / L]])
     )
-    np.testing.assert_allclose(MIRROR @ loc8().forward, printed, atol=1e-12)
+    np.testing.assert_allclose(MIRROR @ robot("loc8").forward, printed, atol=1e-12)
 
 
 def test_forward_inverts_inverse():
-    np.testing.assert_allclose(loc8().forward @ loc8().inverse, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(robot("loc8").forward @ robot("loc8").inverse, np.eye(3), atol=1e-12)
 
 
 def test_heading_identity_of_table_5_5():
     # -theta1 + theta2 - theta3 + theta4 = 4 (l1 + l2)/R dpsi
-    wheels = loc8().inverse @ np.array([0.3, -0.2, 0.7])
+    wheels = robot("loc8").inverse @ np.array([0.3, -0.2, 0.7])
     assert np.dot([-1, 1, -1, 1], wheels) == pytest.approx(4 * 7.060 * 0.7, rel=1e-3)
 
 

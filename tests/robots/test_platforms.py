@@ -3,14 +3,14 @@ ranks."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.theses.textbook import TEXTBOOK, planar
+from benchmarks.theses.textbook import wheel as textbook_wheel
 from trajopt.errors import ArgumentError
 from trajopt.optimize.ipopt import numpy_on_symbols
 from trajopt.robots.mobility import (
@@ -24,12 +24,11 @@ from trajopt.robots.mobility import (
     steering_for,
     steering_rates,
 )
-from trajopt.robots.named import NAMED, differential, four_mecanum, platform_named, two_steer
-from trajopt.robots.platform import Body, Platform
+from trajopt.robots.robot import Robot, robot
 from trajopt.robots.wheel import Wheel, WheelKind
 from trajopt.systems.asoc.modules import (
     AsocGeometry,
-    asoc_platform,
+    asoc_robot,
     link_velocities,
     module_inverse,
     module_jacobian,
@@ -136,27 +135,15 @@ def test_rows_agree_with_finite_differences(
     ],
 )
 def test_mobility_table(name: str, expected: tuple[int, int, int]) -> None:
-    found = mobility_of(platform_named(name))
+    found = mobility_of(TEXTBOOK[name])
     assert (found.mobility, found.steerability, found.manoeuvrability) == expected
 
 
-def test_every_named_platform_is_in_the_mobility_table() -> None:
-    assert set(NAMED) == {
-        "differential",
-        "bicycle",
-        "tricycle",
-        "two-steer",
-        "three-omni",
-        "four-mecanum",
-        "asoc",
-    }
-
-
 def test_two_fixed_wheels_that_are_not_parallel_cannot_drive() -> None:
-    wheel = Wheel(WheelKind.FIXED, 0.5, 0.0, 0.3, 0.1)
-    body = Body(1.0, 1.0, (0.0, 0.0, 0.1), ((0.5, 0.0),), (np.nan,), (True,))
-    wheels = (wheel, replace(wheel, alpha=2.0, beta=-0.4), replace(wheel, alpha=-2.0, beta=1.0))
-    platform = Platform("stuck", wheels, body, ((1.0, 0.0),), holonomic=False)
+    places = ((0.5, 0.0, 0.3), (-0.2, 0.4, 1.5), (-0.2, -0.4, -0.9))
+    platform = planar(
+        "stuck", *(textbook_wheel("fixed", x, y, angle=angle) for x, y, angle in places)
+    )
     assert mobility_of(platform).mobility == 0
     assert admissible_at(platform).shape == (3, 0)
     assert np.all(forward_at(platform) == 0)
@@ -168,7 +155,21 @@ def test_mecanum_matrices_of_thesis_000() -> None:
     total = a + b
     printed = np.array([[1, 1, -total], [1, -1, total], [1, -1, -total], [1, 1, total]]) / radius
     mapping = np.diag([1.0, -1.0, 1.0])
-    platform = four_mecanum(a, b, radius)
+    platform = Robot.mecanum(
+        name="mine",
+        mass=30.0,
+        cog=(0.0, 0.0, 0.15),
+        chassis=(0.5, 0.4, 0.1),
+        clearance=0.1,
+        wheelbase=2 * a,
+        track=2 * b,
+        radius=radius,
+        width=0.05,
+        wheel_mass=1.0,
+        torque=5.0,
+        rollers=12,
+        roller_radius=0.01,
+    )
     np.testing.assert_allclose(platform.inverse, printed @ mapping, atol=1e-12)
     inverse = (
         radius
@@ -180,7 +181,7 @@ def test_mecanum_matrices_of_thesis_000() -> None:
 
 def test_two_fixed_wheels_drive_as_the_lecture_says() -> None:
     b, radius, v, turn = 0.25, 0.1, 0.8, 0.6
-    speeds = radius * differential(b, radius).inverse @ np.array([v, 0.0, turn])
+    speeds = radius * TEXTBOOK["differential"].inverse @ np.array([v, 0.0, turn])
     np.testing.assert_allclose(speeds, [v - b * turn, v + b * turn], atol=1e-12)
 
 
@@ -195,7 +196,7 @@ def test_two_fixed_wheels_drive_as_the_lecture_says() -> None:
 )
 def test_asoc_rows_give_equations_1_and_18(alpha, vx, vy, wz, split, offset) -> None:
     geometry = AsocGeometry(3, split, offset)
-    platform, twist = asoc_platform(geometry), np.array([vx, vy, wz])
+    platform, twist = asoc_robot(geometry), np.array([vx, vy, wz])
     steering = wheel_steering(geometry, alpha)
     speeds = (geometry.wheel_radius * inverse_at(platform, steering) @ twist).reshape(3, 2)
     links = link_velocities(geometry.positions, twist)
@@ -224,10 +225,10 @@ def test_module_inverse_and_platform_angles_agree() -> None:
     product = module_inverse(alpha, 0.21, 0.09, 0.4) @ module_jacobian(alpha, 0.21, 0.09, 0.4)
     np.testing.assert_allclose(product, np.broadcast_to(np.eye(2), (3, 2, 2)), atol=1e-12)
     geometry = AsocGeometry(3, 0.21, 0.09)
-    turned = asoc_platform(geometry, alpha)
+    turned = asoc_robot(geometry, alpha)
     np.testing.assert_allclose(
         turned.inverse,
-        inverse_at(asoc_platform(geometry), wheel_steering(geometry, alpha)),
+        inverse_at(asoc_robot(geometry), wheel_steering(geometry, alpha)),
         atol=1e-12,
     )
     assert turned.admissible.shape == (3, 3)
@@ -253,9 +254,7 @@ def test_frames_of_table_viii_put_the_wheels_where_the_rows_have_them() -> None:
 def test_printed_errors_of_the_lecture_fail_on_a_rolling_wheel() -> None:
     """A unicycle rolling at yaw satisfies R^T and not the R that eqs. 5-10 print."""
     yaw, speed, radius = 0.7, 0.4, 0.1
-    wheel = Wheel(WheelKind.FIXED, 0.0, 0.0, np.pi / 2, radius)
-    body = Body(1.0, 1.0, (0.0, 0.0, 0.1), ((0.0, 0.0),), (np.nan,), (True,))
-    platform = Platform("unicycle", (wheel,), body, ((1.0, 0.0),), holonomic=False)
+    platform = planar("unicycle", textbook_wheel("fixed", 0.0, 0.0))
     rates = np.array([speed * np.cos(yaw), speed * np.sin(yaw), 0.3, speed / radius, 0.0])
     np.testing.assert_allclose(pfaffian(platform, yaw=yaw) @ rates, 0.0, atol=1e-12)
     printed = np.array(
@@ -274,7 +273,7 @@ def test_printed_sliding_rows_lack_a_term(kind: WheelKind) -> None:
 
 
 def test_same_rows_on_symbols() -> None:
-    platform = asoc_platform(AsocGeometry(2))
+    platform = asoc_robot(AsocGeometry(2))
     angles = ca.MX.sym("beta", 4)
     with numpy_on_symbols(True):
         matrix = ca.vertcat(
@@ -287,7 +286,7 @@ def test_same_rows_on_symbols() -> None:
 
 @pytest.mark.parametrize("name", ["bicycle", "tricycle", "two-steer"])
 def test_steered_wheels_follow_a_common_centre(name: str) -> None:
-    platform = platform_named(name)
+    platform = TEXTBOOK[name]
     twist = np.array([0.8, 0.0, 0.5]) if name != "two-steer" else np.array([0.8, 0.3, 0.5])
     angles = steering_for(platform, twist)
     basis = admissible_at(platform, angles)
@@ -310,15 +309,15 @@ def test_centre_of_a_translation_is_at_infinity_and_of_rest_nowhere() -> None:
 @pytest.mark.parametrize(
     "call",
     [
-        lambda: inverse_at(two_steer(), [0.1]),
-        lambda: pfaffian(two_steer(), [np.nan, 0.0]),
-        lambda: platform_named("tank"),
+        lambda: inverse_at(TEXTBOOK["two-steer"], [0.1]),
+        lambda: pfaffian(TEXTBOOK["two-steer"], [np.nan, 0.0]),
+        lambda: robot("tank"),
         lambda: AsocGeometry(1),
         lambda: AsocGeometry(3, split=np.nan),
-        lambda: asoc_platform(AsocGeometry(3), [0.0]),
+        lambda: asoc_robot(AsocGeometry(3), [0.0]),
         lambda: wheel_frame(AsocGeometry(3), 3, 1, 0.0, 0.0),
         lambda: Wheel(WheelKind.FIXED, 0.5, 0.0, 0.0, 0.1, lateral=0.1),
-        lambda: pfaffian_rows(two_steer(), [0.0]),
+        lambda: pfaffian_rows(TEXTBOOK["two-steer"], [0.0]),
     ],
 )
 def test_bad_input_is_refused(call) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trajopt.errors import ArgumentError
-from trajopt.robots.catalogue import robot_named
+from trajopt.robots.robot import robot as shipped
 from trajopt.simulate.engine import ENGINES, Command, Observation, SimRobot, make_engine
 from trajopt.simulate.scene import Flat, Ramp, Scene, Step, blocks
 from trajopt.simulate.stepping import Pace, explosion
@@ -131,14 +131,11 @@ def test_explosions_are_told_from_calm_states() -> None:
     assert "rad/s" in explosion(seen(wheel_speeds=np.array([0.0, 0.0, 1e4, 0.0])))
 
 
-def test_a_simulated_robot_is_a_platform(mecanum_robot: SimRobot) -> None:
-    """Its kinematics are the platform's, and that is the one the planner uses for LOC8."""
-    platform, planned = mecanum_robot.platform, robot_named("loc8")
-    np.testing.assert_allclose(platform.inverse, planned.inverse, rtol=1e-12)
-    assert platform.admissible.shape == (3, 3)
-    assert platform.body.mass == pytest.approx(14.5 + 4 * 1.44)
-    assert platform.body.contacts == mecanum_robot.wheel_positions
-    twist = np.array([0.3, -0.2, 0.7])
-    np.testing.assert_allclose(
-        platform.forward @ mecanum_robot.wheel_speeds(*twist), twist, atol=1e-12
-    )
+def test_a_simulated_robot_weighs_what_the_planner_says(mecanum_robot: SimRobot) -> None:
+    """Chassis and wheels have the described mass and height of the centre of gravity."""
+    body, wheels = shipped("loc8").body, mecanum_robot.wheels
+    masses = np.array([mecanum_robot.chassis_mass, *(wheel.mass for wheel in wheels)])
+    heights = np.array([mecanum_robot.cog_height, *(wheel.radius for wheel in wheels)])
+    assert masses.sum() == pytest.approx(body.mass) == pytest.approx(14.5 + 4 * 1.44)
+    assert masses @ heights / masses.sum() == pytest.approx(body.cog[2])
+    assert mecanum_robot.wheel_positions == body.contacts

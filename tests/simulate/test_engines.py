@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.robots.robot import robot as shipped
 from trajopt.simulate.engine import ENGINES, Command, Recording, SimRobot, make_engine
 from trajopt.simulate.mujoco import MuJoCo
 from trajopt.simulate.scene import Ramp, Scene, Step
 from trajopt.simulate.straight import DIRECTIONS, deviation, straight_command
-from trajopt.systems.smdw.loc8_model import loc8_mecanum
-from trajopt.systems.smdw.wheel import loc8_smdw
+from trajopt.systems.smdw.loc8_model import roller_robot
 
 pytest.importorskip("pybullet")
 pytest.importorskip("mujoco")
@@ -24,7 +24,7 @@ SMDW_LIMIT = {"pybullet": 0.03, "mujoco": 0.015}
 
 @pytest.fixture(scope="module")
 def smdw_robot() -> SimRobot:
-    return loc8_smdw()
+    return roller_robot(shipped("loc8-smdw"))
 
 
 @pytest.mark.parametrize(("name", "direction"), DIRECTIONS)
@@ -56,7 +56,9 @@ def test_smdw_over_five_metres(
 def test_lateral_motion_loses_what_the_tilting_roller_axis_costs(shape: str) -> None:
     # While a roller carries from phi = -pi/n to pi/n its axis dips: R w cos(phi) = vx cos(phi) + vy
     # tan(angle), so the lateral speed is R w times the mean of cos(phi) = sin(pi/n)/(pi/n)
-    robot = loc8_mecanum(shape=shape, rollers=12, roller_radius=0.0125)  # type: ignore[arg-type]
+    changes = {"shape": shape, "count": 12, "radius": 0.0125}
+    keys = {f"wheels.all.rollers.{key}": value for key, value in changes.items()}
+    robot = roller_robot(shipped("loc8", keys))
     run = MuJoCo().run(robot, Scene(), straight_command(robot, math.pi / 2, 3.0, 0.5))
     expected = math.sin(math.pi / 12) / (math.pi / 12) - 1.0
     assert deviation(run, math.pi / 2, 3.0).along == pytest.approx(expected, abs=3e-3)
@@ -65,7 +67,7 @@ def test_lateral_motion_loses_what_the_tilting_roller_axis_costs(shape: str) -> 
 def test_cylinders_are_worse_than_barrels_on_the_double_wheel() -> None:
     worst = {}
     for shape in ("ellipsoid", "cylinder", "cone"):
-        robot = loc8_smdw(shape=shape)  # type: ignore[arg-type]
+        robot = roller_robot(shipped("loc8-smdw", {"wheels.all.rollers.shape": shape}))
         run = MuJoCo().run(robot, Scene(), straight_command(robot, math.pi / 2, 5.0, SPEED))
         off = deviation(run, math.pi / 2, 5.0)
         worst[shape] = max(abs(off.along), abs(off.across))

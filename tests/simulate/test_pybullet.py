@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.robots.robot import robot
 from trajopt.simulate.engine import Camera, Command, Observation, SimRobot
 from trajopt.simulate.pybullet import PyBullet
 from trajopt.simulate.scene import Scene, Step
 from trajopt.simulate.straight import DIRECTIONS, deviation, straight_command
-from trajopt.systems.smdw.loc8_model import loc8_mecanum
+from trajopt.systems.smdw.loc8_model import roller_robot
 
 pytest.importorskip("pybullet")
 SPEED = 3.0 / 3.6  # m/s, the thesis's 3 km/h
@@ -92,10 +93,14 @@ def test_a_wall_stops_the_robot_and_a_picture_shows_it(mecanum_robot: SimRobot) 
 
 def test_too_many_joints_and_unknown_shapes_are_refused_before_bullet_reads_zeros() -> None:
     command = Command(np.array([0.0, 0.1]), np.zeros((2, 4)))
+
+    def changed(key: str, value: object) -> SimRobot:
+        return roller_robot(robot("loc8", {f"wheels.all.rollers.{key}": value}))
+
     with pytest.raises(ArgumentError, match=r"124 joints.*at most 121"):
-        PyBullet().run(loc8_mecanum(rollers=30), Scene(), command)
+        PyBullet().run(changed("count", 30), Scene(), command)
     with pytest.raises(ArgumentError, match="ellipsoid"):
-        PyBullet().run(loc8_mecanum(shape="ellipsoid"), Scene(), command)
+        PyBullet().run(changed("shape", "ellipsoid"), Scene(), command)
 
 
 @pytest.mark.parametrize("options", [{"step": 0.5}, {"solver_iterations": 0}, {"wheel_gain": 0.0}])

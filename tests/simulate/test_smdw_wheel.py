@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from trajopt.errors import ArgumentError
-from trajopt.robots.loc8 import WHEEL_MASS
+from trajopt.errors import TrajoptError
+from trajopt.robots.robot import robot
 from trajopt.simulate.pybullet import MAX_JOINTS
 from trajopt.simulate.rollers import RollerWheel, Shape, outline_point, support_height
-from trajopt.systems.smdw.geometry import DoubleWheel, support_down
-from trajopt.systems.smdw.wheel import loc8_smdw, smdw_wheel
+from trajopt.systems.smdw.climbing import DEFAULT_WHEEL as SIZES
+from trajopt.systems.smdw.geometry import support_down
+from trajopt.systems.smdw.loc8_model import roller_robot
+from trajopt.systems.smdw.wheel import smdw_wheel
 
-SIZES = DoubleWheel()
 ROUND = np.linspace(-math.pi, math.pi, 3601)
+
+
+def built_wheel(left: bool = True, **changes: object) -> RollerWheel:
+    """A wheel of the shipped robot with other keys, on its left or right side."""
+    keys = {f"wheels.all.{key.replace('__', '.')}": value for key, value in changes.items()}
+    return smdw_wheel(robot("loc8-smdw", keys).description.wheels[0 if left else 1])
 
 
 def hub(wheel: RollerWheel, side: float) -> RollerWheel:
@@ -27,7 +35,7 @@ def hub(wheel: RollerWheel, side: float) -> RollerWheel:
 
 @pytest.mark.parametrize("shape", ["spheres", "barrel", "ellipsoid"])
 def test_rollers_make_the_hub_outline(shape: Shape) -> None:
-    wheel = smdw_wheel(shape=shape)
+    wheel = built_wheel(rollers__shape=shape)
     outline = support_down(SIZES, ROUND)
     built = support_height(hub(wheel, 1.0), ROUND)
     circle = np.cos(ROUND) < 0.0
@@ -38,7 +46,7 @@ def test_rollers_make_the_hub_outline(shape: Shape) -> None:
 
 
 def test_the_assembly_is_round_and_the_hubs_are_half_a_turn_apart() -> None:
-    wheel = smdw_wheel()
+    wheel = built_wheel()
     built = support_height(wheel, ROUND)
     assert np.max(built) <= SIZES.radius + 1e-6
     assert np.min(built) >= SIZES.radius - 5e-5
@@ -48,7 +56,7 @@ def test_the_assembly_is_round_and_the_hubs_are_half_a_turn_apart() -> None:
 
 def test_clearance_lets_a_five_centimetre_step_under_the_outer_hub() -> None:
     for left in (True, False):
-        wheel = smdw_wheel(outer_left=left)
+        wheel = built_wheel(left)
         side = 1.0 if left else -1.0
         down = np.array([0.0])
         assert SIZES.radius - support_height(hub(wheel, side), down)[0] > 0.05
@@ -57,7 +65,7 @@ def test_clearance_lets_a_five_centimetre_step_under_the_outer_hub() -> None:
 
 def test_contact_offsets_of_the_thesis_follow_from_the_sizes_fitted_to_them() -> None:
     # SMDW thesis, Figure 4.10: 4.63 cm at 30 deg, 3.49 cm at 60 deg; flat-faced cam, offset h'(phi)
-    sizes = DoubleWheel(radius=0.1029, minor_radius=0.0554)
+    sizes = replace(SIZES, radius=0.1029, minor_radius=0.0554)
     for degrees, printed in ((30.0, 0.0463), (60.0, 0.0349)):
         phi = math.radians(degrees)
         point = outline_point(phi, lambda p: support_down(sizes, p))
@@ -66,27 +74,27 @@ def test_contact_offsets_of_the_thesis_follow_from_the_sizes_fitted_to_them() ->
 
 
 def test_robot_has_the_printed_wheel_mass_and_fits_into_bullet() -> None:
-    robot = loc8_smdw()
-    assert [wheel.mass for wheel in robot.wheels] == pytest.approx([WHEEL_MASS] * 4)
-    assert 4 + sum(len(wheel.rollers) for wheel in robot.wheels) <= MAX_JOINTS
+    found = roller_robot(robot("loc8-smdw"))
+    assert [wheel.mass for wheel in found.wheels] == pytest.approx([1.44] * 4)
+    assert 4 + sum(len(wheel.rollers) for wheel in found.wheels) <= MAX_JOINTS
     np.testing.assert_allclose(
-        robot.wheel_speeds(0.0, 1.0, 0.0), np.array([-1.0, 1.0, 1.0, -1.0]) / 0.098, rtol=1e-12
+        found.wheel_speeds(0.0, 1.0, 0.0), np.array([-1.0, 1.0, 1.0, -1.0]) / 0.098, rtol=1e-12
     )
 
 
 @pytest.mark.parametrize(
     ("make", "named"),
     [
-        (lambda: DoubleWheel(minor_radius=0.2), "minor_radius"),
-        (lambda: DoubleWheel(depth=0.0), "depth"),
-        (lambda: smdw_wheel(circle_rollers=1), "rollers"),
-        (lambda: smdw_wheel(mass=0.5), "mass"),
+        (lambda: replace(SIZES, minor_radius=0.2), "minor_radius"),
+        (lambda: replace(SIZES, depth=0.0), "depth"),
+        (lambda: built_wheel(rollers__count=1), "rollers"),
+        (lambda: built_wheel(mass=0.5), "mass"),
         (
-            lambda: smdw_wheel(DoubleWheel(minor_radius=0.02), ellipse_roller_radius=0.03),
+            lambda: built_wheel(double__minor_radius=0.02, double__roller_radius=0.03),
             "roller_radius",
         ),
     ],
 )
 def test_impossible_wheels_name_the_argument(make: object, named: str) -> None:
-    with pytest.raises(ArgumentError, match=named):
+    with pytest.raises(TrajoptError, match=named):
         make()  # type: ignore[operator]

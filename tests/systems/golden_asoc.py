@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.theses.textbook import TEXTBOOK
 from tests.systems.golden_data import Figures
 from trajopt.robots.mobility import mobility_of
-from trajopt.robots.named import NAMED
 from trajopt.systems.asoc.design import TERMS, AsocDesign, Model, best_width, full_factorial
 from trajopt.systems.asoc.isotropy import Contact, best_ratio, mean_isotropy, spread_modules
 from trajopt.systems.asoc.modules import AsocGeometry, largest_pivot
@@ -145,8 +145,8 @@ def asoc_tracking() -> Figures:
 def lecture_mobility() -> Figures:
     """Mobility and steerability of the textbook platforms."""
     found = {}
-    for name, make in NAMED.items():
-        classes = mobility_of(make())
+    for name, robot in TEXTBOOK.items():
+        classes = mobility_of(robot)
         found[f"{name}, mobility"] = float(classes.mobility)
         found[f"{name}, steerability"] = float(classes.steerability)
     return found

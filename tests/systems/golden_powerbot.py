@@ -16,13 +16,8 @@ from trajopt.paths.path import Path as RobotPath
 from trajopt.paths.samples import sample_path
 from trajopt.problem.given_path import PathProblem, load_path_problem
 from trajopt.refine.profile import follow
-from trajopt.robots.powerbot import (
-    FRICTION,
-    REACTION_TIME,
-    SCAN_TIME,
-    SONAR_RANGE,
-    powerbot,
-)
+from trajopt.robots.robot import robot as shipped
+from trajopt.systems.powerbot.constants import FRICTION, REACTION_TIME, SCAN_TIME, SONAR_RANGE
 from trajopt.systems.powerbot.limits import (
     thesis_slide_speed,
     thesis_slip_acceleration,
@@ -40,7 +35,7 @@ SLOPES = (0.0, 5.99, -5.99)  # deg; experiment 4's ramp
 def powerbot_limits() -> Figures:
     """Slip and tip limits by slope, uphill > 0, the thesis's and the physical ones; safe speeds."""
     found = {}
-    robot = powerbot()
+    robot = shipped("powerbot")
     for degrees in SLOPES:
         slope = math.radians(degrees)
         thesis = np.array([slope])

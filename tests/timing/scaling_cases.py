@@ -6,33 +6,41 @@ import numpy as np
 
 from trajopt.limits.registry import LIMITS
 from trajopt.paths.path import Path
-from trajopt.robots.loc8 import loc8
-from trajopt.robots.platform import Body, Platform, differential_platform
+from trajopt.robots.robot import Robot, robot
 
 NAN = float("nan")
 
 
-def rear_cog_robot(friction_height: float = 0.215) -> Platform:
+def rear_cog_robot(friction_height: float = 0.215) -> Robot:
     """Differential drive: axle at x = 0, casters at x = -0.35, centre of gravity 0.132 m behind the
     axle."""
-    body = Body(
-        120.0,
-        8.0,
-        (-0.132, 0.0, friction_height),
-        ((0.0, 0.2), (0.0, -0.2), (-0.35, 0.15), (-0.35, -0.15)),
-        (NAN,) * 4,
-        (True, True, False, False),
-    )
-    return differential_platform(
-        "rear-cog",
-        half_track=0.2,
-        radius=0.12,
-        body=body,
-        footprint=((0.2, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.2, -0.3)),
+    size = {"radius": 0.12, "width": 0.05, "mass": 2.0}
+    wheels = [
+        {"name": name, "kind": "fixed", "position": [0.0, y], **size}
+        for name, y in (("left", 0.2), ("right", -0.2))
+    ]
+    wheels += [
+        {"name": name, "kind": "castor", "position": [-0.3, y], "trail": 0.05, **size}
+        for name, y in (("castor-left", 0.15), ("castor-right", -0.15))
+    ]
+    return Robot.of(
+        {
+            "name": "rear-cog",
+            "body": {
+                "mass": 120.0,
+                "cog": [-0.132, 0.0, friction_height],
+                "yaw_inertia": 8.0,
+                "chassis": [0.7, 0.6, 0.2],
+                "chassis_place": [-0.15, 0.0],
+                "clearance": 0.1,
+            },
+            "wheels": wheels,
+            "motors": [{"name": "drives", "wheels": ["left", "right"], "torque": 9.0}],
+        }
     )
 
 
-ROBOTS = {"loc8": loc8(), "rear_cog": rear_cog_robot()}
+ROBOTS = {"loc8": robot("loc8"), "rear_cog": rear_cog_robot()}
 
 _SLALOM = [[0, 0], [1, 0.5], [2, -0.5], [3, 0.3]]
 PATHS = {

@@ -177,13 +177,13 @@ importlib.util.find_spec = lambda name, *rest: None if name == "numba" else foun
 from trajopt.errors import MissingDependencyError
 from trajopt.limits.registry import LIMITS
 from trajopt.paths.path import Path
-from trajopt.robots.loc8 import loc8
+from trajopt.robots.robot import robot as shipped
 from trajopt.timing.scaling import time_scale
 path = Path.through([[0, 0], [1, 0.3], [2, 0]], heading=[0, 0.5, 0])
 limits = [LIMITS["speed"](1.0), LIMITS["wheel_acceleration"](10.0)]
-print(time_scale(path, limits, robot=loc8(), gridpoints=50).engine)
+print(time_scale(path, limits, robot=shipped("loc8"), gridpoints=50).engine)
 try:
-    time_scale(path, limits, robot=loc8(), engine="compiled")
+    time_scale(path, limits, robot=shipped("loc8"), engine="compiled")
 except MissingDependencyError as error:
     print(error.extra)
 """

@@ -19,7 +19,7 @@ from scaling_cases import (
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.registry import LIMITS
 from trajopt.paths.path import Path
-from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.timing.scaling import time_scale
 
 ENGINES = ("toppra", "compiled")

@@ -19,7 +19,7 @@ from numpy.random import Generator
 from trajopt.arrays import Array, fold
 from trajopt.control.bend import TAIL_STRETCH, Goal, Reference, eased, reference_of, resolved
 from trajopt.errors import ArgumentError
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import FreeGround
 
@@ -75,7 +75,7 @@ class Estimate:
     covariance: Array
 
 
-def predict(estimate: Estimate, robot: Platform, turned: Array) -> Estimate:
+def predict(estimate: Estimate, robot: Robot, turned: Array) -> Estimate:
     """Estimate after the wheels turned by ``turned`` (W,) rad (odometry)."""
     step = robot.forward @ turned
     yaw = estimate.pose[2] + step[2] / 2
@@ -119,7 +119,7 @@ class ApproachController:
     Raises ArgumentError where the manoeuvre turns too little for its wheel phase to be corrected.
     """
 
-    robot: Platform
+    robot: Robot
     reference: Reference
     goal: Goal
     estimate: Estimate
@@ -200,7 +200,7 @@ class ApproachController:
 
 def approach_controller(
     trajectory: Trajectory,
-    robot: Platform,
+    robot: Robot,
     wheels: Array,
     critical: tuple[int, ...],
     *,

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import FreeGround
 
@@ -89,7 +89,7 @@ def eased(reference: Reference, stretch: float) -> Reference:
     return replace(reference, times=times)
 
 
-def wheel_path(robot: Platform, pose: Array) -> Array:
+def wheel_path(robot: Robot, pose: Array) -> Array:
     """(..., N, W): wheel angles gained along poses (..., N, 3), heading taken in the middle of each
     piece."""
     step, yaw = np.diff(pose, axis=-2), (pose[..., 1:, 2] + pose[..., :-1, 2]) / 2
@@ -121,7 +121,7 @@ def resolved(
     estimate: Array,
     wheels: Array,
     goal: Goal,
-    robot: Platform,
+    robot: Robot,
     *,
     phase: bool = True,
     doubt: float = 0.0,
@@ -165,7 +165,7 @@ def _bent(base: Array, sigma: Array, z: Array) -> Array:
 
 
 def _solve_bend(
-    base: Array, sigma: Array, wheels: Array, goal: Goal, robot: Platform, doubt: float
+    base: Array, sigma: Array, wheels: Array, goal: Goal, robot: Robot, doubt: float
 ) -> Array:
     """(6,): Gauss-Newton steps on weighted wheel errors, bends and missing room."""
     length = max(float(np.sum(np.hypot(*np.diff(base[:, :2], axis=0).T))), 1e-3)

@@ -16,7 +16,7 @@ import numpy as np
 
 from trajopt.arrays import Array, fold, require_positive
 from trajopt.errors import ArgumentError
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
 _SMALL_TURN = 1e-9  # rad in one step below which a step is straight
@@ -60,7 +60,7 @@ class Comparison(NamedTuple):
     distance: float  # m
 
 
-def half_track(robot: Platform) -> float:
+def half_track(robot: Robot) -> float:
     """Half the distance between the wheels, m. Raises ArgumentError unless the robot has two driven
     wheels."""
     if robot.holonomic or len(robot.wheels) != 2:
@@ -103,7 +103,7 @@ def commands(
     return Commands(edges[:-1], speeds[:, 0], speeds[:, 1], sample_time)
 
 
-def driven(orders: Commands, robot: Platform, start: Sequence[float], times: Array) -> Array:
+def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array) -> Array:
     """(N, 3): poses (m, m, rad) at ``times`` (N,) s of a drive that executes the commands without
     slip.
 
@@ -208,7 +208,7 @@ def _read_log(path: FilePath) -> Array:
     return log
 
 
-def _robot(trajectory: Trajectory) -> Platform:
+def _robot(trajectory: Trajectory) -> Robot:
     if trajectory.robot is None:
         raise ArgumentError(
             "trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))"

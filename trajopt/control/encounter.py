@@ -16,7 +16,7 @@ from trajopt.arrays import Array, require_finite, require_not_negative, require_
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit, Rows
 from trajopt.paths.samples import sample_path
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
 _SPACING = 0.01  # m between table entries; chosen
@@ -145,7 +145,7 @@ class Course:
 
 
 def course(
-    trajectory: Trajectory, robot: Platform, *, limits: Sequence[Limit] | None = None
+    trajectory: Trajectory, robot: Robot, *, limits: Sequence[Limit] | None = None
 ) -> Course:
     """Tables for replanning along ``trajectory``; ``robot`` gives the outline.
 

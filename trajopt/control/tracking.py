@@ -21,7 +21,7 @@ from numpy.random import Generator
 
 from trajopt.arrays import Array, fold, require_not_negative, require_positive
 from trajopt.control.commands import half_track
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
 
@@ -101,7 +101,7 @@ class Tracked:
 def track(
     trajectory: Trajectory,
     tracker: Tracker | None,
-    robot: Platform,
+    robot: Robot,
     *,
     sample_time: float,
     disturbance: Disturbance,

@@ -9,7 +9,7 @@ import numpy as np
 from trajopt.arrays import require_positive
 from trajopt.limits.limit import Rows, linear_rows
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 _MOVING = (
     1e-6  # translation per path parameter below which it is a turn on the spot; as in paths/samples
@@ -36,7 +36,7 @@ class Acceleration:
         require_positive(f"{self.name}.forward", self.forward, "m/s^2")
         require_positive(f"{self.name}.braking", self.braking, "m/s^2 (a magnitude)")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         travel = path.twist[:, :2]
         p = np.hypot(travel[:, 0], travel[:, 1])
         moving = p > _MOVING

@@ -15,7 +15,7 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import STANDARD_GRAVITY, Body
+from trajopt.robots.robot import STANDARD_GRAVITY, Body
 
 
 @dataclass(frozen=True)

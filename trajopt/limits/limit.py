@@ -10,7 +10,7 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Limit(Protocol):
     @property
     def name(self) -> str: ...
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         """Rows at the gridpoints of ``path``. Raises ArgumentError where the limit needs a
         robot."""
         ...
@@ -83,7 +83,7 @@ def by_wheel(
     return float(values.min()), values.min() / values
 
 
-def require_robot(name: str, robot: Platform | None) -> Platform:
+def require_robot(name: str, robot: Robot | None) -> Robot:
     """The robot, or ArgumentError: the limit ``name`` cannot be told without one."""
     if robot is None:
         raise ArgumentError(

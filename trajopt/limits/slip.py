@@ -11,7 +11,7 @@ from trajopt.errors import ArgumentError
 from trajopt.limits.forces import Affine, contact_arms, contact_loads, ground_wrench, specific_force
 from trajopt.limits.limit import Rows, linear_rows, require_robot
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import STANDARD_GRAVITY, Body, Platform
+from trajopt.robots.robot import STANDARD_GRAVITY, Body, Robot
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Slip:
                 f"{self.name}.sides", self.sides, "4 or more sides of the friction polygon"
             )
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         body = require_robot(self.name, robot).body
         driven = np.asarray(body.driven, dtype=bool)
         if not driven.any():

@@ -9,7 +9,7 @@ import numpy as np
 from trajopt.arrays import require_positive
 from trajopt.limits.limit import Rows, speed_rows
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -26,5 +26,5 @@ class Speed:
     def __post_init__(self) -> None:
         require_positive(f"{self.name}.largest", self.largest, "m/s")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         return speed_rows(self.name, np.hypot(path.twist[:, 0], path.twist[:, 1]), self.largest)

@@ -10,7 +10,7 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Rows
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 _TOUCH = 1e-9  # m; a zone reaches this far beyond its ends, so that the gridpoint on its edge belongs to it
 
@@ -34,7 +34,7 @@ class SpeedZones:
                     f"{self.name}.zones[{i}]", zone, "(from, to > from, speed >= 0), m and m/s"
                 )
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         bound = np.full(len(path.s), np.inf)
         for start, end, speed in self.zones:
             inside = (path.s >= start - _TOUCH) & (path.s <= end + _TOUCH)
@@ -66,7 +66,7 @@ class SpeedProfile:
         if len(speeds) != len(self.places) or not np.all(np.isfinite(speeds)) or np.any(speeds < 0):
             raise ArgumentError(f"{self.name}.speeds", self.speeds, "one speed >= 0 m/s a place")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         return _bound(
             self.name, np.interp(path.s, self.places, self.speeds) ** 2, tuple(self.places)
         )

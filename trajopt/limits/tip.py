@@ -11,7 +11,7 @@ from trajopt.errors import ArgumentError
 from trajopt.limits.forces import contact_arms, specific_force
 from trajopt.limits.limit import Rows, linear_rows, require_robot
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import STANDARD_GRAVITY, Body, Platform
+from trajopt.robots.robot import STANDARD_GRAVITY, Body, Robot
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Tip:
     def __post_init__(self) -> None:
         require_not_negative(f"{self.name}.reserve", self.reserve, "m")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         body = require_robot(self.name, robot).body
         normals, distances = support_edges(body)
         distances = distances - self.reserve

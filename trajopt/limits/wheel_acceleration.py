@@ -14,7 +14,7 @@ from trajopt.limits.limit import (
     require_robot,
 )
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class WheelAcceleration:
     def __post_init__(self) -> None:
         require_each_positive(f"{self.name}.largest", self.largest, "rad/s^2")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         inverse = require_robot(self.name, robot).inverse
         least, shares = by_wheel(f"{self.name}.largest", self.largest, len(inverse))
         a, b = path.twist @ inverse.T * shares, path.twist_rate @ inverse.T * shares

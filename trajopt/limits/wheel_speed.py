@@ -14,7 +14,7 @@ from trajopt.limits.limit import (
     speed_rows,
 )
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class WheelSpeed:
     def __post_init__(self) -> None:
         require_each_positive(f"{self.name}.largest", self.largest, "rad/s")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         inverse = require_robot(self.name, robot).inverse
         least, shares = by_wheel(f"{self.name}.largest", self.largest, len(inverse))
         rates = np.abs(path.twist @ inverse.T) * shares

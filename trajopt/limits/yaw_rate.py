@@ -9,7 +9,7 @@ import numpy as np
 from trajopt.arrays import require_positive
 from trajopt.limits.limit import Rows, speed_rows
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -22,5 +22,5 @@ class YawRate:
     def __post_init__(self) -> None:
         require_positive(f"{self.name}.largest", self.largest, "rad/s")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         return speed_rows(self.name, np.abs(path.twist[:, 2]), self.largest)

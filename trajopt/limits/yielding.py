@@ -9,7 +9,7 @@ import numpy as np
 
 from trajopt.limits.limit import Limit, Rows
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Yielding:
     def name(self) -> str:
         return self.limit.name
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         rows = self.limit.rows(path, robot)
         braking = np.interp(path.s, self.places, self.squares)
         return replace(

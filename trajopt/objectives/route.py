@@ -23,7 +23,7 @@ from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
 from trajopt.paths.path import Path
 from trajopt.paths.samples import along_tangent
 from trajopt.paths.spline import SplineBasis
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.compiled import fastest_profiles
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import assemble
@@ -68,7 +68,7 @@ class RouteObjective:
     values: Array
     free: tuple[int, ...]
     bounds: Array
-    robot: Platform
+    robot: Robot
     limits: tuple[Limit, ...] = ()
     corridor: Corridor = Corridor()
     radius: float = 0.0

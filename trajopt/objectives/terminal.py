@@ -24,8 +24,8 @@ from trajopt.paths.path import Path
 from trajopt.paths.spline import SplineBasis, uniform_basis
 from trajopt.problem.search import Problem
 from trajopt.robots.actuator import Actuator
-from trajopt.robots.catalogue import robot_named
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
+from trajopt.robots.robot import robot as shipped
 
 SEARCH_STEPS = 252  # 84 steps a spline segment, 14 to 20 ms on the problems at hand; chosen
 COARSE_STEPS = 84  # steps for Newton steps, chosen
@@ -54,7 +54,7 @@ class TerminalObjective:
     """
 
     problem: Problem
-    robot: Platform
+    robot: Robot
     steps: int = SEARCH_STEPS
     kinematics: Kinematics | None = None  # None: the robot's own; given only to compare conventions
 
@@ -462,7 +462,7 @@ def terminal_cost(
 
 def terminal_objective(problem: Problem, *, steps: int = SEARCH_STEPS) -> TerminalObjective:
     """The terminal objective of a problem on its own robot."""
-    return TerminalObjective(problem, robot_named(problem.robot.name), steps)
+    return TerminalObjective(problem, shipped(problem.robot.name), steps)
 
 
 def with_free(problem: Problem, *free: str) -> Problem:

@@ -36,8 +36,7 @@ from trajopt.problem.search import (
     set_key,
     validated,
 )
-from trajopt.robots.platform import Platform
-from trajopt.robots.powerbot import LARGEST_GRADE, powerbot
+from trajopt.robots.robot import Robot, robot
 from trajopt.systems.powerbot.limits import ThesisSlide, ThesisSlip, ThesisTip
 from trajopt.world.ramp import Ramp, Ramps, lay_over
 
@@ -108,7 +107,9 @@ class PathLimits(Section):
     yaw_rate: Positive | None = Field(None, description="rad/s")
     wheel_speed: Positive | None = Field(None, description="rad/s")
     wheel_acceleration: Positive | None = Field(None, description="rad/s^2")
-    grade: Positive = Field(LARGEST_GRADE, description="steepest slope, rad")
+    grade: Positive = Field(
+        math.radians(8.53), description="steepest slope, rad (default: thesis 004, section 2.3.2.4)"
+    )
 
     @model_validator(mode="after")
     def _both(self) -> Self:
@@ -177,9 +178,9 @@ class PathProblem(Section):
     source: str = Field("<problem>", exclude=True, repr=False)
 
     @cached_property
-    def platform(self) -> Platform:
+    def platform(self) -> Robot:
         """The robot."""
-        return powerbot()
+        return robot("powerbot")
 
     @cached_property
     def flat_path(self) -> Path:

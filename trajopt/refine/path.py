@@ -30,7 +30,7 @@ from trajopt.optimize.ipopt import (
 )
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import assemble
 from trajopt.timing.trajectory import Trajectory
@@ -88,7 +88,7 @@ def optimize_path(
     bounds: ArrayLike,
     limits: Callable[[Path], Sequence[Limit]] | Sequence[Limit],
     *,
-    robot: Platform | None = None,
+    robot: Robot | None = None,
     ground: Terrain | None = None,
     trust: float = 0.3,
     steps: int = 12,
@@ -147,7 +147,7 @@ class _Linearised:
 def _step(
     build: Builder,
     used: Callable[[Path], Sequence[Limit]],
-    robot: Platform | None,
+    robot: Robot | None,
     now: Trajectory,
     z: Array,
     box: Array,
@@ -205,7 +205,7 @@ def _step(
 def _linearised(
     build: Builder,
     used: Callable[[Path], Sequence[Limit]],
-    robot: Platform | None,
+    robot: Robot | None,
     z: Array,
     u: Array,
 ) -> _Linearised:

@@ -20,7 +20,7 @@ from trajopt.limits.limit import Limit
 from trajopt.limits.speed_bound import SpeedProfile
 from trajopt.optimize.ipopt import numpy_on_symbols, solve_program, stacked, total, variables
 from trajopt.paths.path import Path
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import check, fine_rows, stages_of
 from trajopt.timing.trajectory import Trajectory
@@ -56,7 +56,7 @@ def follow(
     profile: SpeedProfile,
     limits: Sequence[Limit],
     *,
-    robot: Platform | None = None,
+    robot: Robot | None = None,
     ground: Terrain | None = None,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
@@ -101,7 +101,7 @@ def _least_squares(
     path: Path,
     profile: SpeedProfile,
     limits: tuple[Limit, ...],
-    robot: Platform | None,
+    robot: Robot | None,
     ground: Terrain,
     warm: Trajectory,
 ) -> Followed:

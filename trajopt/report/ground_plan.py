@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon, Rectangle
 from trajopt.arrays import Array, fold
 from trajopt.problem.search import WHEELS, Problem
 from trajopt.report.style import BLACK, GREY, LIGHT
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 _NOSE = 0.22  # share of the robot's length that the mark of its front takes, chosen
 _SLAB = 0.06  # m, drawn depth of the obstacle, chosen
@@ -21,7 +21,7 @@ _SQUARE = np.radians(
 )  # largest angle at which the robot is taken to meet an edge across its start yaw, chosen
 
 
-def outline(robot: Platform, pose: Array) -> Array:
+def outline(robot: Robot, pose: Array) -> Array:
     """(K, 2): corners of the robot's footprint in the world, m, at pose (x, y, yaw)."""
     return placed(np.asarray(robot.footprint, dtype=np.float64), pose)
 
@@ -34,7 +34,7 @@ def placed(points: Array, pose: Array) -> Array:
 
 def draw_robot(
     axes: Axes,
-    robot: Platform,
+    robot: Robot,
     pose: Array,
     colour: str = GREY,
     *,
@@ -94,7 +94,7 @@ def draw_space(axes: Axes, problem: Problem) -> None:
     )
 
 
-def obstacle_strip(problem: Problem, robot: Platform, width: float) -> tuple[Array, float] | None:
+def obstacle_strip(problem: Problem, robot: Robot, width: float) -> tuple[Array, float] | None:
     """(4, 2) corners of a strip for the obstacle's near edge, m, and the yaw it faces; None for
     level ground.
 
@@ -123,7 +123,7 @@ def obstacle_strip(problem: Problem, robot: Platform, width: float) -> tuple[Arr
     return np.array(strip), yaw
 
 
-def draw_obstacle(axes: Axes, problem: Problem, robot: Platform) -> None:
+def draw_obstacle(axes: Axes, problem: Problem, robot: Robot) -> None:
     """The obstacle's near edge as a hatched strip, where there is one."""
     found = obstacle_strip(problem, robot, 1.2)
     if found is not None:

@@ -30,7 +30,7 @@ from trajopt.report.style import (
     WIDTH,
     new_figure,
 )
-from trajopt.robots.catalogue import robot_named
+from trajopt.robots.robot import robot as shipped
 
 _MOMENTS = 6  # robot outlines between start and goal, chosen
 _MOST_DOTS = 20_000  # explored candidates that are drawn, chosen
@@ -38,7 +38,7 @@ _MOST_DOTS = 20_000  # explored candidates that are drawn, chosen
 
 def path_figure(solution: Solution) -> Figure:
     """Figure of the path in the world, equal scales, m."""
-    problem, robot = solution.problem, robot_named(solution.problem.robot.name)
+    problem, robot = solution.problem, shipped(solution.problem.robot.name)
     start, goal = np.asarray(problem.start.pose), np.asarray(problem.goal.pose)
     poses = _poses(solution)
     ends = [outline(robot, pose) for pose in (start, goal, *poses)]

@@ -24,7 +24,7 @@ from trajopt.report.style import (
     legend_beside,
     new_figure,
 )
-from trajopt.robots.catalogue import robot_named
+from trajopt.robots.robot import robot as shipped
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
@@ -86,7 +86,7 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
 
 
 def _draw_paths(axes: Axes, solution: Solution, report: ValidationReport) -> None:
-    robot, pose = robot_named(solution.problem.robot.name), report.recording.pose
+    robot, pose = shipped(solution.problem.robot.name), report.recording.pose
     planned, final = report.planned[-1], pose[-1]
     draw_robot(axes, robot, report.planned[0], GREEN, strong=True, label="start")
     draw_robot(axes, robot, planned, GREY, strong=True, label="end, planned")

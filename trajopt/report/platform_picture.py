@@ -13,7 +13,7 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.report.style import BLACK, BLUE, GREY, LIGHT, ORANGE, VERMILION, new_figure
 from trajopt.robots.mobility import mobility_of, rotation_centre
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.robots.wheel import Wheel, WheelKind
 
 _WIDTH_SHARE = 0.35  # drawn wheel width over diameter, chosen
@@ -23,7 +23,7 @@ _NEAREST_INFINITY = (
 
 
 def platform_figure(
-    platform: Platform, *, steering: ArrayLike | None = None, twist: ArrayLike | None = None
+    platform: Robot, *, steering: ArrayLike | None = None, twist: ArrayLike | None = None
 ) -> Figure:
     """Figure of a platform at steering angles (W,), rad; with a body ``twist`` (vx, vy, wz) also
     the velocity of each wheel and the instantaneous centre of rotation. Raises ArgumentError for

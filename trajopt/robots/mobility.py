@@ -1,4 +1,4 @@
-"""What motions a platform allows: Pfaffian matrix, mobility table, kinematics at given steering
+"""What motions a robot allows: Pfaffian matrix, degrees of mobility, kinematics at given steering
 angles.
 
 Steering angles are one a wheel (W,), as the wheels' ``beta``; entries of wheels that cannot turn
@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot, null_space, wheel_rates
 from trajopt.robots.wheel import Row, Wheel, WheelKind
 
-_RANK = 1e-9  # singular values below this share of the largest count as zero
 _TURNS = (WheelKind.STEERED, WheelKind.CASTOR)
+_SLIDE = (WheelKind.FIXED, WheelKind.STEERED)  # whose sliding rows forbid motions
 
 
 @dataclass(frozen=True)
@@ -38,17 +38,17 @@ class Mobility:
         return self.mobility + self.steerability
 
 
-def pfaffian_rows(platform: Platform, steering: Sequence[Any] | None = None) -> list[list[Any]]:
+def pfaffian_rows(robot: Robot, steering: Sequence[Any] | None = None) -> list[list[Any]]:
     """Rows of the Pfaffian matrix A as nested lists, so that steering angles may be symbols.
 
     A @ (vx, vy, wz, phi'_1 .. phi'_W, beta'_1 .. beta'_W) = 0: a rolling and a sliding row a wheel,
     the twist in the body frame. Rows that constrain nothing (Swedish sliding, spherical) are left
     out.
     """
-    angles = _angles(platform, steering)
-    count = len(platform.wheels)
+    angles = _angles(robot, steering)
+    count = len(robot.wheels)
     matrix: list[list[Any]] = []
-    for index, (wheel, beta) in enumerate(zip(platform.wheels, angles, strict=True)):
+    for index, (wheel, beta) in enumerate(zip(robot.wheels, angles, strict=True)):
         for row in _constraints(wheel, beta):
             spins: list[Any] = [0.0] * count
             steers: list[Any] = [0.0] * count
@@ -57,17 +57,13 @@ def pfaffian_rows(platform: Platform, steering: Sequence[Any] | None = None) -> 
     return matrix
 
 
-def pfaffian(
-    platform: Platform, steering: ArrayLike | None = None, *, yaw: float | None = None
-) -> Array:
+def pfaffian(robot: Robot, steering: ArrayLike | None = None, *, yaw: float | None = None) -> Array:
     """(R, 3 + 2 W): the Pfaffian matrix A of ``pfaffian_rows`` as numbers.
 
     With ``yaw`` (rad) the twist is (x', y', yaw') in the world frame, as in lecture 003; R^T(yaw)
     stands where the lecture's eqs. 5-10 print R.
     """
-    matrix = np.array(
-        pfaffian_rows(platform, _checked(platform, steering).tolist()), dtype=np.float64
-    )
+    matrix = np.array(pfaffian_rows(robot, _checked(robot, steering).tolist()), dtype=np.float64)
     if yaw is not None:
         c, s = np.cos(yaw), np.sin(yaw)
         to_body = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -75,74 +71,71 @@ def pfaffian(
     return matrix
 
 
-def inverse_at(platform: Platform, steering: ArrayLike | None = None) -> Array:
+def inverse_at(robot: Robot, steering: ArrayLike | None = None) -> Array:
     """(W, 3): wheel rates (rad/s) = inverse @ (vx, vy, wz) at steering angles (W,), rad."""
-    rows = [
-        w.driving(b) for w, b in zip(platform.wheels, _checked(platform, steering), strict=True)
-    ]
-    return np.array([[r.x / r.spin, r.y / r.spin, r.yaw / r.spin] for r in rows], dtype=np.float64)
+    if steering is None or robot.description.skid is not None:
+        return robot.inverse
+    angles = _checked(robot, steering)
+    return wheel_rates([w.driving(b) for w, b in zip(robot.wheels, angles, strict=True)])
 
 
-def forward_at(platform: Platform, steering: ArrayLike | None = None) -> Array:
+def forward_at(robot: Robot, steering: ArrayLike | None = None) -> Array:
     """(3, W): body twist = forward @ wheel rates at steering angles (W,), rad; least squares where
     wheels disagree, sliding rows exactly kept. Zero where no motion is possible."""
-    allowed = admissible_at(platform, steering)
+    allowed = admissible_at(robot, steering)
     return np.asarray(
-        allowed @ np.linalg.pinv(inverse_at(platform, steering) @ allowed), dtype=np.float64
+        allowed @ np.linalg.pinv(inverse_at(robot, steering) @ allowed), dtype=np.float64
     )
 
 
-def steering_rates(platform: Platform, steering: ArrayLike, twist: ArrayLike) -> Array:
+def steering_rates(robot: Robot, steering: ArrayLike, twist: ArrayLike) -> Array:
     """(W,): steering rates beta' (rad/s) that castors must have at a body twist; 0 for other
     wheels."""
     velocity = np.asarray(twist, dtype=np.float64)
-    rates = np.zeros(len(platform.wheels))
-    for i, (wheel, beta) in enumerate(
-        zip(platform.wheels, _checked(platform, steering), strict=True)
-    ):
+    rates = np.zeros(len(robot.wheels))
+    for i, (wheel, beta) in enumerate(zip(robot.wheels, _checked(robot, steering), strict=True)):
         if wheel.kind is WheelKind.CASTOR:
             row = wheel.sliding(beta)
             rates[i] = float(np.dot((row.x, row.y, row.yaw), velocity)) / row.steer
     return rates
 
 
-def admissible_at(platform: Platform, steering: ArrayLike | None = None) -> Array:
+def admissible_at(robot: Robot, steering: ArrayLike | None = None) -> Array:
     """(3, m): orthonormal basis of the body twists that no sliding row forbids at steering angles
     (W,), rad."""
-    angles = _checked(platform, steering)
-    return _null(
-        _sliding(zip(platform.wheels, angles, strict=True), (WheelKind.FIXED, WheelKind.STEERED))
-    )
+    if steering is None or robot.description.skid is not None:
+        return robot.admissible
+    return null_space(_sliding(zip(robot.wheels, _checked(robot, steering), strict=True), _SLIDE))
 
 
-def mobility_of(platform: Platform) -> Mobility:
-    """Degrees of mobility and steerability of a platform, steered wheels turned to a common centre.
+def mobility_of(robot: Robot) -> Mobility:
+    """Degrees of mobility and steerability of a robot, steered wheels turned to a common centre.
 
     Mobility is 3 - rank of the sliding rows of fixed and steered wheels, steerability the rank that
     steered wheels add to the fixed ones' (003: the rank of the steered rows, where they are
     independent of these).
     """
-    fixed = _sliding([(w, w.beta) for w in platform.wheels], (WheelKind.FIXED,))
-    basis = _null(fixed)
+    if robot.description.skid is not None:
+        return Mobility(2, 0)
+    fixed = _sliding([(w, w.beta) for w in robot.wheels], (WheelKind.FIXED,))
+    basis = null_space(fixed)
     if basis.shape[1] == 0:
         return Mobility(0, 0)
     generic = (
         basis @ np.array([1.0, 0.618, 0.414])[: basis.shape[1]]
     )  # a twist without special symmetry
-    angles = steering_for(platform, generic)
-    every = _sliding(
-        zip(platform.wheels, angles, strict=True), (WheelKind.FIXED, WheelKind.STEERED)
-    )
+    angles = steering_for(robot, generic)
+    every = _sliding(zip(robot.wheels, angles, strict=True), _SLIDE)
     return Mobility(3 - _rank(every), _rank(every) - _rank(fixed))
 
 
-def steering_for(platform: Platform, twist: ArrayLike) -> Array:
+def steering_for(robot: Robot, twist: ArrayLike) -> Array:
     """(W,): steering angles (rad) at which every steered wheel follows a body twist (vx, vy, wz)
     without sliding. Fixed wheels, Swedish wheels and castors keep their ``beta``. A wheel at the
     centre of rotation keeps its angle too, since any serves."""
     vx, vy, wz = np.asarray(twist, dtype=np.float64)
-    angles = [w.beta for w in platform.wheels]
-    for i, wheel in enumerate(platform.wheels):
+    angles = [w.beta for w in robot.wheels]
+    for i, wheel in enumerate(robot.wheels):
         if wheel.kind is WheelKind.STEERED:
             x, y = wheel.position
             along, across = vx - wz * y, vy + wz * x
@@ -175,35 +168,24 @@ def _sliding(wheels: Any, kinds: tuple[WheelKind, ...]) -> Array:
     return np.array([[r.x, r.y, r.yaw] for r in rows], dtype=np.float64).reshape(-1, 3)
 
 
-def _null(rows: Array) -> Array:
-    if len(rows) == 0:
-        return np.eye(3)
-    _, singular, vt = np.linalg.svd(rows)
-    return np.asarray(vt[int(np.sum(singular > _RANK * singular.max())) :].T, dtype=np.float64)
-
-
 def _rank(rows: Array) -> int:
-    return 3 - int(_null(rows).shape[1])
+    return 3 - int(null_space(rows).shape[1])
 
 
-def _angles(platform: Platform, steering: Sequence[Any] | None) -> list[Any]:
+def _angles(robot: Robot, steering: Sequence[Any] | None) -> list[Any]:
     if steering is None:
-        return [w.beta for w in platform.wheels]
-    if len(steering) != len(platform.wheels):
-        raise ArgumentError(
-            "steering", len(steering), f"one angle a wheel ({len(platform.wheels)})"
-        )
-    return [
-        b if w.kind in _TURNS else w.beta for w, b in zip(platform.wheels, steering, strict=True)
-    ]
+        return [w.beta for w in robot.wheels]
+    if len(steering) != len(robot.wheels):
+        raise ArgumentError("steering", len(steering), f"one angle a wheel ({len(robot.wheels)})")
+    return [b if w.kind in _TURNS else w.beta for w, b in zip(robot.wheels, steering, strict=True)]
 
 
-def _checked(platform: Platform, steering: ArrayLike | None) -> Array:
+def _checked(robot: Robot, steering: ArrayLike | None) -> Array:
     if steering is None:
-        return np.array([w.beta for w in platform.wheels], dtype=np.float64)
+        return np.array([w.beta for w in robot.wheels], dtype=np.float64)
     array = np.asarray(steering, dtype=np.float64)
-    if array.shape != (len(platform.wheels),) or not np.all(np.isfinite(array)):
+    if array.shape != (len(robot.wheels),) or not np.all(np.isfinite(array)):
         raise ArgumentError(
-            "steering", array.tolist(), f"{len(platform.wheels)} finite angles, one a wheel, rad"
+            "steering", array.tolist(), f"{len(robot.wheels)} finite angles, one a wheel, rad"
         )
-    return np.array(_angles(platform, array.tolist()), dtype=np.float64)
+    return np.array(_angles(robot, array.tolist()), dtype=np.float64)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from trajopt.schema import read_tables, set_key, validated
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
 DATA = Path(__file__).parent / "data"  # the shipped robots
+_RANK = 1e-9  # singular values below this share of the largest count as zero
 
 
 @dataclass(frozen=True)
@@ -193,11 +194,7 @@ class Robot:
         Steered wheels and castors stand at their own ``beta``; mobility.inverse_at takes other
         angles.
         """
-        rows = [[r.x / r.spin, r.y / r.spin, r.yaw / r.spin] for r in self._rows]
-        matrix = np.array(rows, dtype=np.float64).reshape(-1, 3)
-        if matrix.size:
-            matrix[np.abs(matrix) < 1e-12 * np.abs(matrix).max()] = 0.0
-        return matrix
+        return wheel_rates(self._rows)
 
     @cached_property
     def forward(self) -> Array:
@@ -215,12 +212,9 @@ class Robot:
             return np.eye(3)[:, [0, 2]]
         rows = [w.sliding() for w in self.wheels]
         # a castor gives way by steering
-        constraints = [[r.x, r.y, r.yaw] for r in rows if not r.free and r.steer == 0]
-        if not constraints:
-            return np.eye(3)
-        _, singular, vt = np.linalg.svd(np.array(constraints, dtype=np.float64))
-        rank = int(np.sum(singular > 1e-9 * singular.max()))
-        return np.asarray(vt[rank:].T, dtype=np.float64)
+        return null_space(
+            np.array([[r.x, r.y, r.yaw] for r in rows if not r.free and r.steer == 0])
+        )
 
     @cached_property
     def turning_length(self) -> float:
@@ -283,12 +277,33 @@ def robot(name: str, overrides: Mapping[str, Any] | None = None) -> Robot:
     """
     if name not in robot_names():
         raise ArgumentError("robot.name", name, "one of " + ", ".join(robot_names()))
-    return Robot.load(DATA / f"{name}.toml", overrides)
+    found = _shipped(name)
+    return found.replace(overrides) if overrides else found
+
+
+@lru_cache
+def _shipped(name: str) -> Robot:
+    return Robot.load(DATA / f"{name}.toml")
 
 
 def robot_names() -> tuple[str, ...]:
     """Names of the shipped robots."""
     return tuple(sorted(file.stem for file in DATA.glob("*.toml")))
+
+
+def wheel_rates(rows: list[Row]) -> Array:
+    """(W, 3): wheel rates (rad/s) that rolling rows give to each component of the body twist."""
+    matrix = np.array([[r.x / r.spin, r.y / r.spin, r.yaw / r.spin] for r in rows]).reshape(-1, 3)
+    matrix[np.abs(matrix) < 1e-12 * np.abs(matrix).max(initial=0.0)] = 0.0
+    return np.asarray(matrix, dtype=np.float64)
+
+
+def null_space(rows: Array) -> Array:
+    """(3, m): orthonormal basis of the body twists that no row (R, 3) forbids."""
+    if len(rows) == 0:
+        return np.eye(3)
+    _, singular, vt = np.linalg.svd(np.asarray(rows, dtype=np.float64))
+    return np.asarray(vt[int(np.sum(singular > _RANK * singular.max())) :].T, dtype=np.float64)
 
 
 def kinematic(wheel: WheelSection) -> Wheel:

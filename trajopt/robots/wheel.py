@@ -141,21 +141,3 @@ class Wheel:
             roll.yaw - share * slide.yaw,
             roll.spin,
         )
-
-
-def swedish_wheel(x: float, y: float, radius: float, gamma: float) -> Wheel:
-    """Swedish wheel at (x, y), driving along the body's +x axis, rollers turned by ``gamma``.
-
-    With gamma = -45 deg the front-left wheel of a Mecanum platform obeys r phi' = vx - vy - (x + y)
-    wz.
-    """
-    alpha = float(np.arctan2(y, x))
-    return Wheel(
-        WheelKind.SWEDISH, float(np.hypot(x, y)), alpha, np.pi / 2 - alpha, radius, gamma=gamma
-    )
-
-
-def fixed_wheel(x: float, y: float, radius: float) -> Wheel:
-    """Fixed standard wheel at (x, y), driving along the body's +x axis."""
-    alpha = float(np.arctan2(y, x))
-    return Wheel(WheelKind.FIXED, float(np.hypot(x, y)), alpha, np.pi / 2 - alpha, radius)

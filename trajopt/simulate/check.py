@@ -10,11 +10,11 @@ from trajopt.arrays import Array
 from trajopt.control.approach import Mode, approach_controller
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.problem.search import Problem
-from trajopt.robots.catalogue import robot_named
+from trajopt.robots.robot import robot as shipped
 from trajopt.simulate.engine import Camera, Command, Controller, Recording, make_engine
 from trajopt.simulate.scene import Scene
 from trajopt.systems.smdw.approach_run import SETTLE, steered
-from trajopt.systems.smdw.loc8_model import loc8_mecanum
+from trajopt.systems.smdw.loc8_model import roller_robot
 from trajopt.timing.trajectory import Trajectory
 
 SAMPLE_TIME = 0.002  # s between wheel speed commands: the engines' own step
@@ -102,7 +102,7 @@ def _controlled(
     start = np.asarray(problem.start.wheels, dtype=np.float64)
     controller = approach_controller(
         trajectory,
-        robot_named(problem.robot.name),
+        shipped(problem.robot.name),
         start,
         problem.goal.critical_indices,
         cap=problem.limits.wheel_speed or np.inf,
@@ -128,7 +128,7 @@ def _run(
     engine: str, problem: Problem, command: Command, picture: bool, controller: Controller | None
 ) -> Recording:
     recording = make_engine(engine).run(
-        loc8_mecanum(),
+        roller_robot(shipped("loc8")),
         Scene(problem.scene.friction),
         command,
         controller=controller,

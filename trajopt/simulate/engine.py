@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -17,12 +16,11 @@ from numpy.typing import NDArray
 
 from trajopt.arrays import Array, IntArray
 from trajopt.errors import ArgumentError
-from trajopt.robots.platform import Body, Platform
-from trajopt.robots.wheel import swedish_wheel
+from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 from trajopt.simulate.rollers import RollerWheel, Vector
 from trajopt.simulate.scene import Scene, require
 
-GRAVITY = 9.81  # m/s^2, standard gravity, rounded
+GRAVITY = STANDARD_GRAVITY
 ENGINES = ("pybullet", "mujoco")
 
 
@@ -30,7 +28,7 @@ ENGINES = ("pybullet", "mujoco")
 class SimRobot:
     """A chassis box on four roller wheels, all that an engine needs to build it.
 
-    ``chassis_mass`` [kg] without wheels, ``chassis_size`` (length, width, height) [m] of the box
+    ``robot`` is what it was made from, ``chassis_mass`` [kg] without wheels, ``chassis_size`` (length, width, height) [m] of the box
     that collides with the terrain, ``chassis_clearance`` [m] from the ground to its bottom,
     ``cog_height`` [m] of the chassis alone above the ground, ``wheel_positions`` four (x, y) [m],
     ``wheels`` in the same order, ``torque_limit`` [N m] at each wheel, ``chassis_inertia``
@@ -38,6 +36,7 @@ class SimRobot:
     """
 
     name: str
+    robot: Robot
     chassis_mass: float
     chassis_size: Vector
     chassis_clearance: float
@@ -79,49 +78,9 @@ class SimRobot:
             [(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)]
         )
 
-    @cached_property
-    def platform(self) -> Platform:
-        """The same robot as wheels on a body: its kinematics, and the data that limits need.
-
-        Swedish wheels, each with the roller that touches flat ground; the footprint is the box
-        around chassis and wheels.
-        """
-        masses = np.array([wheel.mass for wheel in self.wheels])
-        places = self.wheel_centres()
-        mass = self.chassis_mass + float(masses.sum())
-        x, y, height = (
-            masses @ places + self.chassis_mass * np.array([0.0, 0.0, self.cog_height])
-        ) / mass
-        # wheels as points: their own inertia about the vertical is about 1 % of what their places
-        # give
-        yaw_inertia = self.inertia[2] + float(masses @ np.sum(places[:, :2] ** 2, axis=1))
-        angles = tuple(wheel.angle for wheel in self.wheels)
-        body = Body(
-            mass,
-            yaw_inertia,
-            (float(x), float(y), float(height)),
-            self.wheel_positions,
-            angles,
-            (True,) * 4,
-        )
-        reach = [self.chassis_size[0] / 2.0, self.chassis_size[1] / 2.0]
-        for (px, py), wheel in zip(self.wheel_positions, self.wheels, strict=True):
-            reach = [
-                max(reach[0], abs(px) + wheel.radius),
-                max(reach[1], abs(py) + wheel.width / 2.0),
-            ]
-        ex, ey = reach
-        wheels = tuple(
-            swedish_wheel(px, py, wheel.radius, wheel.angle)
-            for (px, py), wheel in zip(self.wheel_positions, self.wheels, strict=True)
-        )
-        return Platform(
-            self.name, wheels, body, ((ex, ey), (-ex, ey), (-ex, -ey), (ex, -ey)), holonomic=True
-        )
-
     def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> Array:
         """Wheel speeds (4,) [rad/s] that roll without slip at body speeds (m/s, m/s, rad/s)."""
-        speeds: Array = self.platform.inverse @ np.array([vx, vy, yaw_rate])
+        speeds: Array = self.robot.inverse @ np.array([vx, vy, yaw_rate])
         return speeds
 
 

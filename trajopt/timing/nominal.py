@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import require_positive
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.grid import initial_grid
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.trajectory import Trajectory
@@ -23,7 +23,7 @@ def nominal_timing(
     duration: float,
     limits: Sequence[Limit],
     *,
-    robot: Platform | None = None,
+    robot: Robot | None = None,
     ground: Terrain | None = None,
     start_wheels: ArrayLike = (),
 ) -> Trajectory:

@@ -14,7 +14,7 @@ from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import require_moving, sample_at
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.compiled import controllable_sets
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
 from trajopt.timing.feasibility import allowed_end, require_motion
@@ -47,7 +47,7 @@ class _Job:
 
     path: Path
     limits: tuple[Limit, ...]
-    robot: Platform | None
+    robot: Robot | None
     ground: Terrain
     start: float
     end: float
@@ -60,7 +60,7 @@ def time_scale(
     path: Path,
     limits: Sequence[Limit],
     *,
-    robot: Platform | None = None,
+    robot: Robot | None = None,
     ground: Terrain | None = None,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
@@ -124,7 +124,7 @@ def rough_duration(
     path: Path,
     limits: Sequence[Limit],
     *,
-    robot: Platform | None = None,
+    robot: Robot | None = None,
     gridpoints: int | ArrayLike | None = None,
 ) -> float:
     """Duration (s) from rest to rest of the fastest profile that keeps the limits at the
@@ -147,7 +147,7 @@ def start_speeds(
     path: Path,
     limits: Sequence[Limit],
     *,
-    robot: Platform | None = None,
+    robot: Robot | None = None,
     ground: Terrain | None = None,
     end_speed: float = 0.0,
     gridpoints: int | ArrayLike | None = None,
@@ -169,7 +169,7 @@ def start_speeds(
 def _job(
     path: Path,
     limits: Sequence[Limit],
-    robot: Platform | None,
+    robot: Robot | None,
     ground: Terrain | None,
     speeds: tuple[float, float],
     engine: str,
@@ -184,8 +184,8 @@ def _job(
     for limit in limits:
         if not hasattr(limit, "rows") or isinstance(limit, type):
             raise ArgumentError("limits", limit, "limits, as Speed(1.0)")
-    if robot is not None and not isinstance(robot, Platform):
-        raise ArgumentError("robot", robot, "a Platform, as loc8(), or None")
+    if robot is not None and not isinstance(robot, Robot):
+        raise ArgumentError("robot", robot, "a Robot, as robot('loc8'), or None")
     if ground is not None and not hasattr(ground, "check"):
         raise ArgumentError("ground", ground, "the shape of the ground, as Flat(), or None")
     names = [limit.name for limit in limits]
@@ -216,18 +216,8 @@ def _require_drivable(job: _Job, u: Array) -> None:
     twist."""
     require_moving(job.path)
     twist = sample_at(job.path, job.path.parameter(u), u).twist
-    if job.robot is None:
-        return
-    slipping = twist - twist @ job.robot.admissible @ job.robot.admissible.T
-    bad = np.abs(slipping).max(axis=1) > 1e-6 * np.abs(twist).max(axis=1)
-    if bad.any():
-        place = float(job.path.parameter(u[bad][:1])[0])
-        raise InfeasibleError(
-            "rolling",
-            place,
-            f"the wheels of '{job.robot.name}' cannot roll along this path; "
-            "leave its heading to the direction of travel",
-        )
+    if job.robot is not None:
+        job.robot.require_rolling(twist, job.path.parameter(u))
 
 
 def _stages(job: _Job, fine: FineRows, tighter: float) -> Stages:

@@ -18,7 +18,7 @@ from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples, sample_at
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 SD2_CAP = 1e8  # m^2/s^2; stands for "no bound": 10 km/s, far beyond any ground robot
 FINER = 10  # intervals of the fine grid in one of the solver's (DESIGN)
@@ -77,7 +77,7 @@ class Check:
     factor: Array
 
 
-def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Platform | None) -> Stages:
+def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Robot | None) -> Stages:
     """Rows of all limits at the samples. Raises ArgumentError where a limit's rows are not
     finite."""
     rows = [limit.rows(samples, robot) for limit in limits]
@@ -106,7 +106,7 @@ def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Platform | No
     return Stages(samples.s, a, b, c, np.min(bounds, axis=0), names, owner, bounds, edges)
 
 
-def fine_rows(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | None) -> FineRows:
+def fine_rows(path: Path, u: Array, limits: Sequence[Limit], robot: Robot | None) -> FineRows:
     """Rows of all limits inside every interval of the grid u (N+1,)."""
     (share, a, b, c, bounds), some = _rows_inside(path, u[:-1], u[1:], limits, robot)
     return FineRows(
@@ -115,7 +115,7 @@ def fine_rows(path: Path, u: Array, limits: Sequence[Limit], robot: Platform | N
 
 
 def _rows_inside(
-    path: Path, left: Array, right: Array, limits: Sequence[Limit], robot: Platform | None
+    path: Path, left: Array, right: Array, limits: Sequence[Limit], robot: Robot | None
 ) -> tuple[tuple[Array, ...], Stages]:
     """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,); and the last
     of the pieces that they were assembled in, which has names, owners and edges."""
@@ -141,7 +141,7 @@ def _rows_inside(
 
 
 def refined(
-    path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot: Platform | None
+    path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot: Robot | None
 ) -> FineRows:
     """Rows on the grid u (M+1,), which contains that of ``fine``: what is known is taken over."""
     at = np.searchsorted(u, fine.u)

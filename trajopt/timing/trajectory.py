@@ -16,7 +16,7 @@ from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.timing.stages import Check, check, fine_rows
 from trajopt.timing.wheels import WheelTable, wheel_table
 from trajopt.world.terrain import Terrain
@@ -55,7 +55,7 @@ class Trajectory:
 
     path: Path
     limits: tuple[Limit, ...]
-    robot: Platform | None
+    robot: Robot | None
     ground: Terrain
     u: Array  # (N+1,) spline parameter at the gridpoints
     s: Array  # (N+1,) path parameter at the gridpoints, m

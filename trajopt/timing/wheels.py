@@ -9,7 +9,7 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
 _FIRST_CELLS, _MOST_CELLS = (
@@ -24,7 +24,7 @@ class WheelTable:
     """Wheel angles (M, W), rad, at spline parameters u (M,), from 0 at the start of the path."""
 
     path: Path
-    robot: Platform
+    robot: Robot
     u: Array
     angles: Array
 
@@ -34,7 +34,7 @@ class WheelTable:
         return self.angles[i] + _turned(self.path, self.robot, self.u[i], u)
 
 
-def wheel_table(path: Path, robot: Platform) -> WheelTable:
+def wheel_table(path: Path, robot: Robot) -> WheelTable:
     """Table of wheel angles whose quadrature is refined until it changes by less than 1e-11 rad a
     segment."""
     knots, cells = np.asarray(path.basis.knots), _FIRST_CELLS
@@ -55,13 +55,13 @@ def _by_segment(gained: Array, cells: int) -> Array:
     return np.asarray(gained.reshape(-1, cells, gained.shape[1]).sum(axis=1))
 
 
-def _cells(path: Path, robot: Platform, knots: Array, cells: int) -> tuple[Array, Array]:
+def _cells(path: Path, robot: Robot, knots: Array, cells: int) -> tuple[Array, Array]:
     spread = np.arange(cells) / cells
     u = np.append((knots[:-1, None] + np.diff(knots)[:, None] * spread).ravel(), knots[-1])
     return u, _turned(path, robot, u[:-1], u[1:])
 
 
-def _turned(path: Path, robot: Platform, start: Array, end: Array) -> Array:
+def _turned(path: Path, robot: Robot, start: Array, end: Array) -> Array:
     """(N, W): angle gained from start to end (each pair inside one cell), five-point Gauss."""
     half = (end - start) / 2
     nodes = ((start + end) / 2)[:, None] + half[:, None] * _GAUSS_X

@@ -15,7 +15,7 @@ from trajopt.systems.asoc.isotropy import (
     mean_isotropy,
     spread_modules,
 )
-from trajopt.systems.asoc.modules import AsocGeometry, asoc_platform, wheel_steering
+from trajopt.systems.asoc.modules import AsocGeometry, asoc_robot, wheel_steering
 
 # Thesis 001, Table I by converged quadrature (an independent computation): N, lost, partial ->
 # value.
@@ -108,7 +108,7 @@ def test_equation_4(degrees) -> None:
 def test_gram_formula_equals_singular_values_of_the_platform() -> None:
     rng = np.random.default_rng(3)
     geometry = AsocGeometry(3, split=0.23, offset=0.09, module_radius=0.6)
-    platform = asoc_platform(geometry)
+    platform = asoc_robot(geometry)
     for _ in range(20):
         alpha = rng.uniform(-np.pi, np.pi, 3)
         rows = inverse_at(platform, wheel_steering(geometry, alpha)) / [1.0, 1.0, 0.6]
@@ -119,7 +119,7 @@ def test_gram_formula_equals_singular_values_of_the_platform() -> None:
 
 def test_at_ratio_two_least_squares_agree_with_the_mean_of_equation_2() -> None:
     geometry = AsocGeometry(3)
-    platform = asoc_platform(geometry)
+    platform = asoc_robot(geometry)
     alpha = np.array([0.3, 1.0, -2.0])
     singular = np.linalg.svd(
         forward_at(platform, wheel_steering(geometry, alpha)) * [[1], [1], [0.5]], compute_uv=False

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trajopt.errors import ArgumentError, SimulationError
+from trajopt.errors import ArgumentError, ProblemError, SimulationError
 from trajopt.systems.asoc.bullet import asoc_in_pybullet, asoc_urdf
 from trajopt.systems.asoc.modules import TOTAL_MASS, AsocGeometry
 from trajopt.systems.asoc.mujoco import asoc_in_mujoco, asoc_mjcf
@@ -114,7 +114,7 @@ def test_leaving_the_map_is_an_error_with_its_place(engine) -> None:
 def test_bad_input_is_refused() -> None:
     with pytest.raises(ArgumentError, match="friction"):
         AsocBody(GEOMETRY, friction=0.0)
-    with pytest.raises(ArgumentError, match="geometry"):
+    with pytest.raises(ProblemError, match=r"body\.mass"):
         AsocBody(AsocGeometry(4, wheel_radius=0.3, wheel_width=0.2))
     with pytest.raises(ArgumentError, match="ground"):
         asoc_in_pybullet(

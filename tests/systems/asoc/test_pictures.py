@@ -7,11 +7,11 @@ import pytest
 
 from benchmarks.theses.asoc_tables import mobility, table_5
 from benchmarks.theses.asoc_tables_tracking import QUICK, difference, interval
+from benchmarks.theses.textbook import TEXTBOOK
 from trajopt.errors import ArgumentError
 from trajopt.report.platform_picture import platform_figure
 from trajopt.report.style import save_figure
 from trajopt.robots.mobility import steering_for
-from trajopt.robots.named import NAMED, platform_named
 from trajopt.systems.asoc.pictures import (
     curve_figure,
     front_figure,
@@ -21,9 +21,9 @@ from trajopt.systems.asoc.pictures import (
 )
 
 
-@pytest.mark.parametrize("name", list(NAMED))
+@pytest.mark.parametrize("name", list(TEXTBOOK))
 def test_every_platform_can_be_drawn_with_its_centre(name, tmp_path) -> None:
-    platform = platform_named(name)
+    platform = TEXTBOOK[name]
     twist = [0.5, 0.0, 0.6]
     figure = platform_figure(platform, steering=steering_for(platform, twist), twist=twist)
     assert save_figure(figure, tmp_path / "a.png").stat().st_size > 5000
@@ -37,9 +37,9 @@ def test_every_platform_can_be_drawn_with_its_centre(name, tmp_path) -> None:
 
 def test_wrong_shapes_are_refused() -> None:
     with pytest.raises(ArgumentError):
-        platform_figure(platform_named("bicycle"), steering=[0.0])
+        platform_figure(TEXTBOOK["bicycle"], steering=[0.0])
     with pytest.raises(ArgumentError):
-        platform_figure(platform_named("bicycle"), twist=[0.0])
+        platform_figure(TEXTBOOK["bicycle"], twist=[0.0])
 
 
 def test_figures_hold_what_they_are_given() -> None:

@@ -13,7 +13,8 @@ from trajopt.errors import InfeasibleError, ProblemError
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
 from trajopt.problem.given_path import PathProblem, load_path_problem
-from trajopt.robots.powerbot import FRICTION, powerbot
+from trajopt.robots.robot import robot as shipped
+from trajopt.systems.powerbot.constants import FRICTION
 from trajopt.systems.powerbot.identify import (
     NEWTON_PER_POUND,
     centre_of_gravity,
@@ -134,8 +135,10 @@ def test_thesis_braking_downhill_is_unsafe() -> None:
         Path.through([[0, 0], [8, 0]]),
         [Ramp((0.5, 0.0), 0.0, 4.266, -0.45, 0.35), Ramp((4.766, 0.0), 0.0, 4.266, -0.45, 0.35)],
     )
-    thesis = time_scale(down, task.as_limits(variant="thesis"), robot=powerbot())
-    rows = task.as_limits(variant="physical")[-2].rows(sample_path(down, thesis.s[:-1]), powerbot())
+    thesis = time_scale(down, task.as_limits(variant="thesis"), robot=shipped("powerbot"))
+    rows = task.as_limits(variant="physical")[-2].rows(
+        sample_path(down, thesis.s[:-1]), shipped("powerbot")
+    )
     used = rows.a * thesis.sdd[:, None] + rows.b * thesis.sd[:-1, None] ** 2
     assert np.any(used > rows.c * 1.0 + 0.05)
 

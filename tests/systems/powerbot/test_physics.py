@@ -22,7 +22,7 @@ from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path
 from trajopt.problem.given_path import PathProblem, load_path_problem
 from trajopt.refine.profile import follow
-from trajopt.robots.powerbot import powerbot
+from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.differential import Floor, Wall, drive_in_pybullet
 from trajopt.systems.powerbot.drive_encounter import DrivenEncounter, drive_encounter
 from trajopt.systems.powerbot.model import powerbot_drive
@@ -31,7 +31,12 @@ from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import Ramp, lay_over
 
 ROOT = FilePath(__file__).resolve().parents[3]
-ROBOT = powerbot(caster_half_track=0.0)  # balancing casters: one point of support behind
+# balancing castors: one point of support behind
+BALANCED = {
+    "wheels.castor-left.position": [-0.31, 0.0],
+    "wheels.castor-right.position": [-0.31, 0.0],
+}
+ROBOT = shipped("powerbot", BALANCED)
 MOTORS = (Speed(2.1), Acceleration(0.55, 7.8))
 
 
@@ -72,7 +77,7 @@ def test_tip_binds_with_grip_and_height() -> None:
     """Friction 1.2 and a high centre of gravity: braking 3 cm inside the tip limit keeps the
     casters down (what is left is the pitch of the compliant contacts), 30 % beyond the limit lifts
     them."""
-    tall = powerbot(cog_height=0.6, caster_half_track=0.0)
+    tall = shipped("powerbot", {**BALANCED, "body.cog": [-0.132, 0.0, 0.6]})
     limits = [Speed(2.0), Acceleration(0.55, 7.8), Slip(1.2, per_wheel=True), Tip(reserve=0.03)]
     plan = time_scale(Path.through([[0, 0], [6, 0]]), limits, robot=tall)
     assert any(part.limit == "tip" for part in plan.active)

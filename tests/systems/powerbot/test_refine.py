@@ -18,7 +18,7 @@ from trajopt.paths.path import Path
 from trajopt.refine.jerk import limit_jerk
 from trajopt.refine.path import corridor, optimize_path
 from trajopt.refine.profile import follow
-from trajopt.robots.powerbot import powerbot
+from trajopt.robots.robot import robot as shipped
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import Ramp, lay_over
@@ -44,7 +44,9 @@ def test_jerk_limit_reaches_the_closed_form(straight: Trajectory) -> None:
 
 def test_jerk_limit_on_a_bend_keeps_slip(straight: Trajectory) -> None:
     path = Path.through([[0, 0], [2, 0.5], [4, -0.3]], start_direction=[1, 0], end_direction=[1, 0])
-    fast = time_scale(path, [Speed(1.5), Acceleration(0.55, 7.8), Slip(0.332)], robot=powerbot())
+    fast = time_scale(
+        path, [Speed(1.5), Acceleration(0.55, 7.8), Slip(0.332)], robot=shipped("powerbot")
+    )
     durations = [limit_jerk(fast, jerk).duration for jerk in (0.5, 2.0, 8.0)]
     assert durations[0] > durations[1] > durations[2] > fast.duration
     with pytest.raises(ArgumentError, match="jerk"):
@@ -57,7 +59,9 @@ def test_jerk_limit_over_a_ramp_keeps_every_row() -> None:
     path = Path.through([[0, 0], [4, 0.3], [8, 0]], start_direction=[1, 0], end_direction=[1, 0])
     limits = [Speed(2.1), Acceleration(0.55, 7.8), Slip(0.332), Tip()]
     fast = time_scale(
-        lay_over(path, [Ramp((2.0, 0.0), 0.0, 4.266, 0.45, 0.35)]), limits, robot=powerbot()
+        lay_over(path, [Ramp((2.0, 0.0), 0.0, 4.266, 0.45, 0.35)]),
+        limits,
+        robot=shipped("powerbot"),
     )
     motion = limit_jerk(fast, 2.0, nodes=80)
     assert set(motion.margins()) == {"speed", "acceleration", "slip", "tip"}

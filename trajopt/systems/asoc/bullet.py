@@ -12,19 +12,14 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, SimulationError
-from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.simulate.pybullet import load_bullet
 from trajopt.systems.asoc.modules import AsocGeometry
 from trajopt.systems.asoc.reference import Reference
 from trajopt.systems.asoc.run import (
     ALPHA_DAMPING,
-    BODY_HALF,
-    BODY_HEIGHT,
     PIVOT_GAIN,
-    SAG,
     STEP,
-    TORQUE,
-    TRAVEL,
     AsocBody,
     AsocRun,
     AsocState,
@@ -94,7 +89,7 @@ def _session(
         path.write_text(asoc_urdf(robot), encoding="utf-8")
         body = bullet.loadURDF(
             str(path),
-            basePosition=(*place, BODY_HEIGHT + lift),
+            basePosition=(*place, robot.body_height + lift),
             flags=bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER,
             physicsClientId=client,
         )
@@ -173,7 +168,7 @@ def _ground(bullet: Any, client: int, ground: HeightMap) -> int:
 def asoc_urdf(robot: AsocBody) -> str:
     """The robot as URDF text. Only wheels and plate collide; Bullet keeps a robot's parts from each
     other."""
-    x, y, z = (2 * half for half in BODY_HALF)
+    x, y, z = robot.body_size
     m = robot.body_mass
     inertia = (m * (y * y + z * z) / 12, m * (x * x + z * z) / 12, m * (x * x + y * y) / 12)
     plate = f'<collision><geometry><box size="{x} {y} {z}"/></geometry></collision>'
@@ -186,7 +181,7 @@ def _module(robot: AsocBody, i: int) -> str:
     px, py = g.positions[i]
     ball = (0.4 * robot.link_mass * 0.05**2,) * 3
     rod = robot.link_mass * g.split**2 / 12
-    drop = g.wheel_radius - BODY_HEIGHT + SAG
+    drop = g.wheel_radius - robot.body_height + robot.sag
     across = robot.wheel_mass * (g.wheel_radius**2 / 4 + g.wheel_width**2 / 12)
     spin = robot.wheel_mass * g.wheel_radius**2 / 2
     tyre = (
@@ -195,7 +190,15 @@ def _module(robot: AsocBody, i: int) -> str:
     )
     parts = [
         _link(f"strut{i}", 0.1, (1e-4, 1e-4, 1e-4)),
-        _joint(f"lift{i}", "prismatic", "body", f"strut{i}", (px, py, drop), "0 0 1", TRAVEL),
+        _joint(
+            f"lift{i}",
+            "prismatic",
+            "body",
+            f"strut{i}",
+            (px, py, drop),
+            "0 0 1",
+            robot.pivot.travel,
+        ),
         _link(f"fork{i}", robot.link_mass - 0.1, ball),
         _joint(f"alpha{i}", "continuous", f"strut{i}", f"fork{i}", (0, 0, 0), "0 0 1"),
         _link(f"axle{i}", robot.link_mass, (rod, 1e-3, rod)),
@@ -206,7 +209,7 @@ def _module(robot: AsocBody, i: int) -> str:
             f"axle{i}",
             (-g.offset, 0, 0),
             "1 0 0",
-            robot.pivot_range,
+            robot.pivot.tilt_range,
         ),
     ]
     for w, side in ((1, -1), (2, 1)):
@@ -271,7 +274,8 @@ class _Session:
         states = b.getJointStates(self.body, joints, physicsClientId=c)
         count = len(self.lifts)
         forces = [
-            -self.robot.stiffness * (s[0] + SAG) - self.robot.damping * s[1] for s in states[:count]
+            -self.robot.stiffness * (s[0] + self.robot.sag) - self.robot.damping * s[1]
+            for s in states[:count]
         ]
         forces += [-ALPHA_DAMPING * s[1] for s in states[count:]]
         b.setJointMotorControlArray(
@@ -282,7 +286,7 @@ class _Session:
             self.spins,
             b.VELOCITY_CONTROL,
             targetVelocities=wheel_speeds.ravel().tolist(),
-            forces=[TORQUE] * len(self.spins),
+            forces=[self.robot.torque] * len(self.spins),
             physicsClientId=c,
         )
         if self.robot.driven_pivots:

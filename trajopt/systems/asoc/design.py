@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
-from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.systems.asoc.isotropy_curve import IsotropyCurve, isotropy_curve
 from trajopt.systems.asoc.modules import BODY_LENGTH, TOTAL_MASS, envelope
 from trajopt.systems.asoc.soil import Soil

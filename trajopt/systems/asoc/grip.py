@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.systems.asoc.modules import TOTAL_MASS, AsocGeometry
 
 PROPORTIONAL = 7.3  # N m s/rad, K_p of thesis 001, section 4.3 (unit inferred)

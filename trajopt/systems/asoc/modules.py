@@ -16,16 +16,13 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, require_positive
 from trajopt.errors import ArgumentError
-from trajopt.robots.platform import Body, Platform
-from trajopt.robots.wheel import Wheel, WheelKind
+from trajopt.robots.robot import Robot, robot
 
-TOTAL_MASS = 65.0  # kg, thesis 001 sections 3 and 4.3
-BODY_LENGTH = 1.0  # m, thesis 001 section 4.3
-WHEEL_RADIUS = 0.10  # m, thesis 001 section 4.3
-SPLIT = 0.20  # m, thesis 001 section 4.3
-OFFSET = 0.10  # m, thesis 001 section 4.3
-WHEEL_WIDTH = 0.03  # m, baseline of thesis 001's Table VI; not printed for section 4.3
-COG_HEIGHT = 0.20  # m, chosen: twice the axle height; not printed
+_SHIPPED = robot("asoc-4").description  # whose sizes are thesis 001's, section 4.3
+_WHEEL = _SHIPPED.wheels[0]
+TOTAL_MASS = _SHIPPED.body.mass  # kg
+BODY_LENGTH = 2 * _WHEEL.position[0]  # m
+_LARGEST_TILT = np.radians(80.0)  # rad, of an axle about the fore-aft axis; chosen
 LEAST_ROOT = (
     1e-12  # m^2, of wheel_radius^2 - offset^2; below, wheel and shaft cannot meet (section 3.1.2)
 )
@@ -40,10 +37,10 @@ class AsocGeometry:
     """
 
     modules: int = 4
-    split: float = SPLIT
-    offset: float = OFFSET
-    wheel_radius: float = WHEEL_RADIUS
-    wheel_width: float = WHEEL_WIDTH
+    split: float = 2 * abs(_WHEEL.lateral)
+    offset: float = _WHEEL.trail
+    wheel_radius: float = _WHEEL.radius
+    wheel_width: float = _WHEEL.width
     module_radius: float = BODY_LENGTH / 2
 
     def __post_init__(self) -> None:
@@ -120,51 +117,61 @@ def steering_rates(alpha: ArrayLike, links: ArrayLike, offset: float, yaw_rate: 
     return np.asarray((-np.sin(a) * v[..., 0] + np.cos(a) * v[..., 1]) / offset - yaw_rate)
 
 
-def asoc_platform(
-    geometry: AsocGeometry,
-    alpha: ArrayLike | None = None,
-    *,
-    mass: float = TOTAL_MASS,
-    cog_height: float = COG_HEIGHT,
-) -> Platform:
-    """The robot as a platform: per module two castor wheels that share a pivot, wheel 1 then wheel
-    2.
+def asoc_robot(geometry: AsocGeometry, alpha: ArrayLike | None = None) -> Robot:
+    """The robot: per module two castor wheels that share a pivot, wheel 1 then wheel 2.
 
     ``alpha`` (N,): module angles, rad, 0 unless given; mobility.inverse_at takes others (beta of a
-    wheel is alpha + pi/2 - zeta). ``mass`` kg; yaw inertia of a uniform disc (chosen).
+    wheel is alpha + pi/2 - zeta). What the geometry leaves open is as in the shipped robot; wheels
+    weigh as their volume, and the yaw inertia is that of a uniform disc (chosen).
     """
     angles = np.zeros(geometry.modules) if alpha is None else np.asarray(alpha, dtype=np.float64)
     if angles.shape != (geometry.modules,) or not np.all(np.isfinite(angles)):
         raise ArgumentError(
             "alpha", angles.tolist(), f"{geometry.modules} finite angles, one a module, rad"
         )
-    wheels = tuple(
-        Wheel(
-            WheelKind.CASTOR,
-            geometry.module_radius,
-            float(zeta),
-            float(a + np.pi / 2 - zeta),
-            geometry.wheel_radius,
-            offset=-geometry.offset,
-            lateral=side * geometry.split / 2,
-        )
-        for zeta, a in zip(geometry.angles, angles, strict=True)
-        for side in (-1.0, 1.0)
+    tables = _SHIPPED.model_dump(exclude_none=True)
+    wheel, pivot, motor = (tables[name][0] for name in ("wheels", "pivots", "motors"))
+    volume = geometry.wheel_radius**2 * geometry.wheel_width / (_WHEEL.radius**2 * _WHEEL.width)
+    tilt = min(
+        float(largest_pivot(geometry.offset, geometry.split, geometry.wheel_radius)), _LARGEST_TILT
     )
-    contacts = [(float(x), float(y)) for x, y in wheel_positions(geometry, angles).reshape(-1, 2)]
-    body = Body(
-        mass,
-        mass * geometry.module_radius**2 / 2,
-        (0.0, 0.0, cog_height),
-        tuple(contacts),
-        (float("nan"),) * len(contacts),
-        (True,) * len(contacts),
+    size = {
+        "radius": geometry.wheel_radius,
+        "width": geometry.wheel_width,
+        "trail": geometry.offset,
+        "mass": _WHEEL.mass * volume,
+    }
+    modules = [f"module-{i + 1}" for i in range(geometry.modules)]
+    wheels = [
+        wheel
+        | size
+        | {"name": f"{name}-{side}", "position": place.tolist(), "angle": float(angle)}
+        | {"lateral": sign * geometry.split / 2}
+        for name, place, angle in zip(modules, geometry.positions, angles, strict=True)
+        for side, sign in (("right", -1), ("left", 1))
+    ]
+    pairs = {name: [f"{name}-right", f"{name}-left"] for name in modules}
+    outer = (geometry.module_radius + workspace_radius(geometry)) / np.cos(np.pi / 12)
+    corners = np.pi / 6 * np.arange(12)  # a 12-gon around the reach of the wheels
+    body = {
+        "yaw_inertia": TOTAL_MASS * geometry.module_radius**2 / 2,
+        "footprint": (outer * np.column_stack([np.cos(corners), np.sin(corners)])).tolist(),
+    }
+    return Robot.of(
+        {
+            "name": f"asoc-{geometry.modules}",
+            "about": tables["about"],
+            "body": tables["body"] | body,
+            "wheels": wheels,
+            "pivots": [
+                pivot | {"name": name, "wheels": pair, "tilt_range": tilt}
+                for name, pair in pairs.items()
+            ],
+            "motors": [
+                motor | {"name": name, "wheels": [name]} for pair in pairs.values() for name in pair
+            ],
+        }
     )
-    reach = geometry.module_radius + workspace_radius(geometry)
-    corners = [2 * np.pi * k / 12 for k in range(12)]  # a 12-gon around the reach of the wheels
-    outer = reach / np.cos(np.pi / 12)
-    footprint = tuple((float(outer * np.cos(t)), float(outer * np.sin(t))) for t in corners)
-    return Platform(f"asoc-{geometry.modules}", wheels, body, footprint, holonomic=True)
 
 
 def wheel_steering(geometry: AsocGeometry, alpha: ArrayLike) -> Array:

@@ -10,19 +10,14 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import SimulationError
-from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.simulate.mujoco import load_mujoco
 from trajopt.systems.asoc.modules import AsocGeometry
 from trajopt.systems.asoc.reference import Reference
 from trajopt.systems.asoc.run import (
     ALPHA_DAMPING,
-    BODY_HALF,
-    BODY_HEIGHT,
     PIVOT_GAIN,
-    SAG,
     STEP,
-    TORQUE,
-    TRAVEL,
     WHEEL_GAIN,
     AsocBody,
     AsocRun,
@@ -61,7 +56,7 @@ def asoc_in_mujoco(
     data = mujoco.MjData(model)
     place, velocity = reference.at(0.0)
     lift = _start_height(robot, ground, place)
-    data.qpos[:3] = (*place, BODY_HEIGHT + lift)
+    data.qpos[:3] = (*place, robot.body_height + lift)
     for i in range(geometry.modules):
         data.joint(f"alpha{i}").qpos[0] = np.arctan2(velocity[1], velocity[0])
     mujoco.mj_forward(model, data)
@@ -102,7 +97,7 @@ def asoc_mjcf(robot: AsocBody, ground: HeightMap) -> str:
     middle = (ground.origin[0] + width / 2, ground.origin[1] + depth / 2, low)
     modules = "".join(_module(robot, i) for i in range(robot.geometry.modules))
     motors = "".join(
-        f'<velocity name="drive{i}{w}" joint="spin{i}{w}" kv="{WHEEL_GAIN}" forcerange="{-TORQUE} {TORQUE}"/>'
+        f'<velocity name="drive{i}{w}" joint="spin{i}{w}" kv="{WHEEL_GAIN}" forcerange="{-robot.torque} {robot.torque}"/>'
         for i in range(robot.geometry.modules)
         for w in (1, 2)
     )
@@ -111,7 +106,7 @@ def asoc_mjcf(robot: AsocBody, ground: HeightMap) -> str:
         f'<position name="tilt{i}" joint="beta{i}" kp="{gain}"/>'
         for i in range(robot.geometry.modules)
     )
-    x, y, z = BODY_HALF
+    x, y, z = (size / 2 for size in robot.body_size)
     return f"""<mujoco><compiler angle="radian"/>
 <option timestep="{STEP}" integrator="implicitfast" cone="elliptic" solver="Newton"
  gravity="0 0 {-STANDARD_GRAVITY}"/>
@@ -119,7 +114,7 @@ def asoc_mjcf(robot: AsocBody, ground: HeightMap) -> str:
 <default><geom contype="0" conaffinity="0" friction="{robot.friction} 0 0" condim="3" solref="{CONTACT}"/></default>
 <worldbody><geom name="ground" type="hfield" hfield="h" pos="{middle[0]} {middle[1]} {middle[2]}" contype="1"
  conaffinity="2"/>
-<body name="body" pos="0 0 {BODY_HEIGHT}"><freejoint/>
+<body name="body" pos="0 0 {robot.body_height}"><freejoint/>
 <geom type="box" size="{x} {y} {z}" mass="{robot.body_mass}" contype="2" conaffinity="1"/>
 {modules}</body></worldbody><actuator>{motors}{pivots}</actuator></mujoco>"""
 
@@ -129,7 +124,7 @@ def _module(robot: AsocBody, i: int) -> str:
     point)."""
     g = robot.geometry
     px, py = g.positions[i]
-    drop = g.wheel_radius - BODY_HEIGHT  # of the axle below the plate's middle
+    drop = g.wheel_radius - robot.body_height  # of the axle below the plate's middle
     wheels = "".join(
         f'<body pos="0 {side * g.split / 2} 0"><joint name="spin{i}{w}" axis="0 1 0" damping="0.001"/>'
         f'<inertial pos="0 0 0" mass="{robot.wheel_mass}" diaginertia="'
@@ -139,13 +134,13 @@ def _module(robot: AsocBody, i: int) -> str:
         for w, side in ((1, -1), (2, 1))
     )
     half = robot.link_mass
-    return f"""<body pos="{px} {py} {drop + SAG}">
+    return f"""<body pos="{px} {py} {drop + robot.sag}">
 <joint name="lift{i}" type="slide" axis="0 0 1" stiffness="{robot.stiffness}" damping="{robot.damping}"
- springref="{-SAG}" limited="true" range="{-TRAVEL} {TRAVEL}"/>
+ springref="{-robot.sag}" limited="true" range="{-robot.pivot.travel} {robot.pivot.travel}"/>
 <joint name="alpha{i}" axis="0 0 1" damping="{ALPHA_DAMPING}"/>
 <geom type="sphere" size="0.05" mass="{half}"/>
 <body pos="{-g.offset} 0 0"><joint name="beta{i}" axis="1 0 0" limited="true" damping="0.1"
- range="{-robot.pivot_range} {robot.pivot_range}"/>
+ range="{-robot.pivot.tilt_range} {robot.pivot.tilt_range}"/>
 <geom type="capsule" fromto="0 {-g.split / 2} 0 0 {g.split / 2} 0" size="0.02" mass="{half}"/>{wheels}</body></body>
 """
 

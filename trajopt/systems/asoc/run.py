@@ -11,15 +11,16 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
 from trajopt.arrays import AnyArray, Array, BoolArray, require_positive
-from trajopt.errors import ArgumentError, SimulationError
-from trajopt.robots.platform import STANDARD_GRAVITY
-from trajopt.systems.asoc.design import MODULE_SHARE, RUBBER
-from trajopt.systems.asoc.modules import TOTAL_MASS, AsocGeometry, largest_pivot
+from trajopt.errors import SimulationError
+from trajopt.robots.description import PivotSection, RobotDescription
+from trajopt.robots.robot import STANDARD_GRAVITY
+from trajopt.systems.asoc.modules import AsocGeometry, asoc_robot
 from trajopt.systems.asoc.reference import Reference
 from trajopt.systems.asoc.tracking import (
     Knowledge,
@@ -35,14 +36,6 @@ FRICTION = 0.6  # thesis 001, section 4.3
 STEP = 0.002  # s, of the engines; measured on other robots of this package: 10 ms drifts
 CONTROL_STRIDE = 5  # steps between two commands: 10 ms, chosen
 SETTLE = 0.5  # s on the springs before the motion starts, chosen
-BODY_HALF = (0.35, 0.35, 0.05)  # m, half sizes of the plate, chosen
-BODY_HEIGHT = 0.25  # m of the plate's middle above the ground, chosen
-SAG = 0.03  # m of the springs under the robot's weight, chosen
-DAMPING_RATIO = 0.7  # of the springs, chosen
-TRAVEL = 0.15  # m of each module up and down, chosen: about half of section 3.5's 0.33 m
-TORQUE = (
-    10.0  # N m a wheel, chosen: twice what friction 0.6 can take at a wheel's share of the weight
-)
 WHEEL_GAIN = 7.3  # N m s/rad, K_p of section 4.3 (unit inferred)
 PIVOT_GAIN = 60.0  # N m/rad of driven pivots, chosen
 ALPHA_DAMPING = 0.05  # N m s/rad of the module axes, chosen
@@ -51,7 +44,7 @@ LARGEST_TILT = 1.2  # rad of body roll or pitch beyond which the robot has tippe
 
 @dataclass(frozen=True)
 class AsocBody:
-    """Masses and springs that both engines build. Geometry as in ``robots.asoc``; N modules."""
+    """The robot as both engines build it: its description, and springs. N modules."""
 
     geometry: AsocGeometry
     friction: float = FRICTION
@@ -59,46 +52,62 @@ class AsocBody:
 
     def __post_init__(self) -> None:
         require_positive("friction", self.friction, "(friction coefficient)")
-        if self.body_mass <= 0:
-            raise ArgumentError(
-                "geometry", self.geometry, f"wheels that leave mass out of {TOTAL_MASS} kg"
-            )
+        _ = self.description  # refuses wheels that leave no mass for the body
+
+    @cached_property
+    def description(self) -> RobotDescription:
+        return asoc_robot(self.geometry).description
+
+    @property
+    def pivot(self) -> PivotSection:
+        """Of each module."""
+        return self.description.pivots[0]
 
     @property
     def wheel_mass(self) -> float:
-        """kg, a solid rubber cylinder (section 3.2)."""
-        g = self.geometry
-        return float(RUBBER * np.pi * g.wheel_radius**2 * g.wheel_width)
+        """kg"""
+        return self.description.wheels[0].mass
 
     @property
     def link_mass(self) -> float:
-        """kg of a module's link; its axle weighs the same: together the thesis's 5 % of the
-        total."""
-        return MODULE_SHARE * TOTAL_MASS / 2
+        """kg of a module's link; its axle weighs the same."""
+        return self.pivot.mass / 2
 
     @property
     def body_mass(self) -> float:
-        return TOTAL_MASS - self.geometry.modules * (2 * self.link_mass + 2 * self.wheel_mass)
+        modules = self.geometry.modules
+        return self.description.body.mass - modules * (self.pivot.mass + 2 * self.wheel_mass)
+
+    @property
+    def body_size(self) -> tuple[float, float, float]:
+        """m"""
+        return self.description.body.chassis
+
+    @property
+    def body_height(self) -> float:
+        """m of the plate's middle above the ground."""
+        return self.description.body.clearance + self.body_size[2] / 2
+
+    @property
+    def sag(self) -> float:
+        """m of the springs under the robot's weight."""
+        return self.pivot.sag or 0.0
+
+    @property
+    def torque(self) -> float:
+        """N m a wheel."""
+        return self.description.motors[0].torque
 
     @property
     def stiffness(self) -> float:
-        """N/m of a module's spring: the body's weight presses it in by ``SAG``."""
-        return self.body_mass * STANDARD_GRAVITY / self.geometry.modules / SAG
+        """N/m of a module's spring: the body's weight presses it in by ``sag``."""
+        return self.body_mass * STANDARD_GRAVITY / self.geometry.modules / self.sag
 
     @property
     def damping(self) -> float:
         """N s/m of a module's spring."""
-        return (
-            2
-            * DAMPING_RATIO
-            * float(np.sqrt(self.stiffness * self.body_mass / self.geometry.modules))
-        )
-
-    @property
-    def pivot_range(self) -> float:
-        """rad either way (eq. 8)."""
-        g = self.geometry
-        return float(min(largest_pivot(g.offset, g.split, g.wheel_radius), np.radians(80)))
+        share = self.body_mass / self.geometry.modules
+        return 2 * self.pivot.damping_ratio * float(np.sqrt(self.stiffness * share))
 
 
 @dataclass(frozen=True, eq=False)

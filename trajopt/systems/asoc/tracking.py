@@ -18,7 +18,7 @@ import numpy as np
 
 from trajopt.arrays import Array, require_positive
 from trajopt.errors import ArgumentError
-from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.systems.asoc.grip import Footing, Motion, next_motion
 from trajopt.systems.asoc.modules import (
     AsocGeometry,

@@ -6,7 +6,6 @@ Names: ``corridor/<seed>/length`` or ``/duration`` (a random corridor with stati
 
 from __future__ import annotations
 
-import math
 from pathlib import Path as FilePath
 from typing import Literal
 
@@ -22,18 +21,13 @@ from trajopt.objectives.base import Objective
 from trajopt.objectives.route import Corridor, RouteObjective
 from trajopt.paths.spline import uniform_basis
 from trajopt.problem.given_path import load_path_problem
-from trajopt.robots.powerbot import (
-    FRICTION,
-    LARGEST_ACCELERATION,
-    LARGEST_SPEED,
-    REAR,
-    WIDTH,
-    powerbot,
-)
+from trajopt.robots.robot import robot
+from trajopt.systems.powerbot.constants import FRICTION, LARGEST_ACCELERATION, LARGEST_SPEED
 
-RADIUS = math.hypot(
-    REAR, WIDTH / 2
-)  # m: the disc about the drive axle that covers PowerBot's outline
+POWERBOT = robot("powerbot")
+RADIUS = float(
+    np.hypot(*np.transpose(POWERBOT.footprint)).max()
+)  # m: a disc about the origin that covers it
 LENGTH = 12.0  # m, of a corridor, chosen
 WALLS = (-2.5, 2.5)  # m, chosen: three robots side by side
 KNOTS = 4  # free ones between start and goal, chosen
@@ -76,7 +70,7 @@ def random_corridor(seed: int, kind: Literal["length", "duration"]) -> RouteObje
         values,
         tuple(range(1, KNOTS + 1)),
         np.array(bounds),
-        powerbot(),
+        POWERBOT,
         (
             Slip(FRICTION),
             Speed(LARGEST_SPEED),

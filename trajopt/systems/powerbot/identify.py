@@ -13,7 +13,7 @@ import numpy as np
 
 from trajopt.arrays import require_positive
 from trajopt.errors import ArgumentError
-from trajopt.robots.platform import STANDARD_GRAVITY
+from trajopt.robots.robot import STANDARD_GRAVITY
 
 NEWTON_PER_POUND = 4.4482216152605  # N/lbf, exact (international avoirdupois pound)
 

@@ -15,7 +15,7 @@ import numpy as np
 from trajopt.arrays import Array, require_positive
 from trajopt.limits.limit import Rows, linear_rows, speed_rows
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 GRAVITY = 9.81  # m/s^2, the thesis's
 SLIP_COSINE = 9.95  # m/s^2 (eq. 2.20, printed coefficient)
@@ -57,7 +57,7 @@ class ThesisSlip:
     def __post_init__(self) -> None:
         require_positive(f"{self.name}.friction", self.friction, "(friction coefficient)")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         return _both_ways(self.name, thesis_slip_acceleration(path.slope, self.friction))
 
 
@@ -67,7 +67,7 @@ class ThesisTip:
 
     name: str = "thesis_tip"
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         return _both_ways(self.name, thesis_tip_acceleration(path.slope))
 
 
@@ -86,7 +86,7 @@ class ThesisSlide:
         require_positive(f"{self.name}.friction", self.friction, "(friction coefficient)")
         require_positive(f"{self.name}.largest_curvature", self.largest_curvature, "1/m")
 
-    def rows(self, path: PathSamples, robot: Platform | None) -> Rows:  # noqa: ARG002
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         speed = thesis_slide_speed(np.array([self.largest_curvature]), self.friction)
         return speed_rows(self.name, np.ones(len(path.s)), speed)
 

@@ -18,11 +18,11 @@ import numpy as np
 
 from trajopt.errors import ArgumentError
 from trajopt.report.intervals import wilson
-from trajopt.robots.loc8 import WHEEL_RADIUS
 from trajopt.simulate.engine import Command, Controller, Recording, SimRobot, make_engine
 from trajopt.simulate.scene import Scene, Step
+from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, loc8_smdw
 from trajopt.systems.smdw.geometry import DoubleWheel
-from trajopt.systems.smdw.wheel import loc8_smdw
+from trajopt.systems.smdw.loc8_model import roller_robot
 
 Four = tuple[float, float, float, float]
 
@@ -38,7 +38,7 @@ TIMEOUT = 1.5  # of the planned duration, SMDW thesis section 6.1
 @lru_cache(maxsize=8)
 def _built(sizes: DoubleWheel, torque: float) -> SimRobot:
     """The robot; building its rollers takes as long as half a trial, so that trials share it."""
-    return loc8_smdw(sizes, torque_limit=torque)
+    return roller_robot(loc8_smdw(sizes).replace({"motors.all.torque": torque}))
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,10 @@ class StepScene:
         return Scene(self.friction, Step(self.height, self.place, self.direction, width=8.0))
 
     def robot(self) -> SimRobot:
-        sizes = DoubleWheel(minor_radius=self.minor_radius, depth=self.hub_depth, gap=self.hub_gap)
-        return _built(sizes, self.torque)
+        radius = DEFAULT_WHEEL.radius
+        return _built(
+            DoubleWheel(radius, self.minor_radius, self.hub_depth, self.hub_gap), self.torque
+        )
 
 
 @dataclass(frozen=True)
@@ -148,7 +150,7 @@ def judge(climb: Climb, recording: Recording) -> Outcome:
     lateral = climb.motion[0] == 0.0
     for i, travel in zip(climb.critical, climb.travel, strict=True):
         turned = np.abs(recording.wheel_angles[:, i] - recording.wheel_angles[0, i])
-        limit = travel / WHEEL_RADIUS + math.pi
+        limit = travel / DEFAULT_WHEEL.radius + math.pi
         first &= bool(risen[:, i].any() and turned[np.argmax(risen[:, i])] <= limit)
         if not lateral:  # forward, the second wheel meets the step while the first one is climbing
             break

@@ -16,13 +16,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import lru_cache
 
 import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.robots.loc8 import HALF_TRACK, HALF_WHEELBASE, WHEEL_RADIUS, loc8
-from trajopt.robots.platform import STANDARD_GRAVITY, Platform
+from trajopt.robots.robot import STANDARD_GRAVITY, Robot, robot
 from trajopt.systems.smdw.geometry import (
     DoubleWheel,
     Meeting,
@@ -31,10 +31,10 @@ from trajopt.systems.smdw.geometry import (
     support_down,
 )
 
-DEFAULT_WHEEL = DoubleWheel()
+DEFAULT_WHEEL = DoubleWheel.of(robot("loc8-smdw").description.wheels[0])
 # Sizes that give the printed contact offsets, 4.63 cm at 30 deg and 3.49 cm at 60 deg (Figure
 # 4.10); fitted.
-FITTED_WHEEL = DoubleWheel(0.1029, 0.0554)
+FITTED_WHEEL = replace(DEFAULT_WHEEL, radius=0.1029, minor_radius=0.0554)
 
 STEEPEST_TANGENT = math.radians(
     10.0
@@ -95,13 +95,17 @@ class Verdict:
     torque: float
 
 
-def loc8_smdw(wheel: DoubleWheel = DEFAULT_WHEEL) -> Platform:
-    """LOC8 on SMDW wheels; its footprint is the rectangle around the four wheels (the frame lies
-    inside)."""
-    if wheel.radius != WHEEL_RADIUS:
-        raise ArgumentError("wheel.radius", wheel.radius, f"LOC8's rolling radius {WHEEL_RADIUS} m")
-    ex, ey = HALF_WHEELBASE + wheel.radius, HALF_TRACK + wheel.width / 2
-    return replace(loc8(), name="loc8-smdw", footprint=((ex, ey), (-ex, ey), (-ex, -ey), (ex, -ey)))
+@lru_cache(maxsize=64)
+def loc8_smdw(wheel: DoubleWheel = DEFAULT_WHEEL) -> Robot:
+    """LOC8 on double wheels of these sizes; its outline is the rectangle around them. Raises
+    ArgumentError for another rolling radius."""
+    if wheel.radius != DEFAULT_WHEEL.radius:
+        raise ArgumentError(
+            "wheel.radius", wheel.radius, f"LOC8's rolling radius {DEFAULT_WHEEL.radius} m"
+        )
+    hubs = {name: getattr(wheel, name) for name in ("minor_radius", "depth", "gap")}
+    changes = {f"wheels.all.double.{name}": value for name, value in hubs.items()}
+    return robot("loc8-smdw", {**changes, "wheels.all.width": wheel.width})
 
 
 def wheel_yaw(motion: Motion, alpha: float) -> float:
@@ -132,7 +136,7 @@ def verdict(
     """Whether the geometry lets a wheel climb from this state; ``load`` (N) on the wheel, default a
     quarter robot."""
     found = meeting(wheel, theta, motion, alpha, height)
-    weight = loc8().body.mass * STANDARD_GRAVITY / 4 if load is None else load
+    weight = robot("loc8-smdw").body.mass * STANDARD_GRAVITY / 4 if load is None else load
     clearance, offset, arm, tangent = (
         float(v) for v in (found.clearance, found.offset, found.arm, found.tangent)
     )

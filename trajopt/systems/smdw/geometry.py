@@ -27,14 +27,8 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError
-from trajopt.robots.loc8 import WHEEL_RADIUS
+from trajopt.robots.description import WheelSection
 
-# Rc is the rolling radius. Re: 5 cm steps need Rc - Re > 5 cm, which the 4.8 cm of 0.098/0.05 m
-# does not give and the sizes fitted to the printed contact offsets (4.75 cm) do not either,
-# although the thesis climbs 5 cm.
-MINOR_RADIUS = 0.047  # m, chosen: Rc - Re = 5.1 cm
-HUB_DEPTH = 0.045  # m along the axle, chosen: the width of its rollers
-HUB_GAP = 0.03  # m between the hubs, chosen: room for the arm that carries the wheel
 CLOUD_POINTS = 36_000  # points a contour; spacing 1.8e-5 m on a 0.1 m wheel
 
 
@@ -46,10 +40,10 @@ class DoubleWheel:
     Raises ArgumentError for sizes that make no double wheel.
     """
 
-    radius: float = WHEEL_RADIUS
-    minor_radius: float = MINOR_RADIUS
-    depth: float = HUB_DEPTH
-    gap: float = HUB_GAP
+    radius: float
+    minor_radius: float
+    depth: float
+    gap: float
 
     def __post_init__(self) -> None:
         require_positive("radius", self.radius, "m")
@@ -61,6 +55,14 @@ class DoubleWheel:
             raise ArgumentError(
                 "depth, gap", (self.depth, self.gap), "a depth > 0 m and a gap >= 0 m"
             )
+
+    @classmethod
+    def of(cls, wheel: WheelSection) -> DoubleWheel:
+        """The described wheel. Raises ArgumentError for one without a double hub."""
+        if wheel.double is None:
+            raise ArgumentError("wheel.double", None, "a double wheel")
+        double = wheel.double
+        return cls(wheel.radius, double.minor_radius, double.depth, double.gap)
 
     @property
     def greatest_clearance(self) -> float:

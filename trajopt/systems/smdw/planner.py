@@ -28,7 +28,7 @@ from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
 from trajopt.problem.search import WHEELS, Problem, WheelName
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 from trajopt.systems.smdw.climbing import (
     LARGEST_FORWARD_ALPHA,
     Motion,
@@ -303,7 +303,7 @@ def _travel(
     return first, second
 
 
-def _wheel_places(robot: Platform) -> dict[WheelName, Array]:
+def _wheel_places(robot: Robot) -> dict[WheelName, Array]:
     """Where each wheel stands in the body (2,), m."""
     return {
         w: np.array(

@@ -26,10 +26,9 @@ from trajopt.problem.search import (
     set_key,
     validated,
 )
-from trajopt.robots.loc8 import WHEEL_RADIUS
-from trajopt.robots.platform import Platform
-from trajopt.systems.smdw.climbing import loc8_smdw
-from trajopt.systems.smdw.geometry import HUB_DEPTH, HUB_GAP, MINOR_RADIUS, DoubleWheel
+from trajopt.robots.robot import Robot
+from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, loc8_smdw
+from trajopt.systems.smdw.geometry import DoubleWheel
 from trajopt.world.free_ground import FreeGround
 
 Rank = Literal["duration", "margin", "climb_rate"]
@@ -39,22 +38,26 @@ class ManeuverRobot(Section):
     """LOC8 on double wheels; the hub sizes may be changed."""
 
     name: Literal["loc8-smdw"] = Field("loc8-smdw", description="robot of the package")
-    minor_radius: Positive = Field(MINOR_RADIUS, description="half-axis Re of the hubs' ellipse, m")
-    hub_depth: Positive = Field(HUB_DEPTH, description="of one hub along the axle, m")
-    hub_gap: NonNegative = Field(HUB_GAP, description="between the hubs, m")
+    minor_radius: Positive = Field(
+        DEFAULT_WHEEL.minor_radius, description="half-axis Re of the hubs' ellipse, m"
+    )
+    hub_depth: Positive = Field(DEFAULT_WHEEL.depth, description="of one hub along the axle, m")
+    hub_gap: NonNegative = Field(DEFAULT_WHEEL.gap, description="between the hubs, m")
     torque_limit: Positive = Field(8.0, description="at a wheel, in the physics check, N m")
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        if self.minor_radius > WHEEL_RADIUS:
+        if self.minor_radius > DEFAULT_WHEEL.radius:
             raise broken_rule(
-                "minor_radius", self.minor_radius, f"a length up to the radius {WHEEL_RADIUS} m"
+                "minor_radius",
+                self.minor_radius,
+                f"a length up to the radius {DEFAULT_WHEEL.radius} m",
             )
         return self
 
     @property
     def wheel(self) -> DoubleWheel:
-        return DoubleWheel(WHEEL_RADIUS, self.minor_radius, self.hub_depth, self.hub_gap)
+        return DoubleWheel(DEFAULT_WHEEL.radius, self.minor_radius, self.hub_depth, self.hub_gap)
 
 
 class ObstacleSection(Section):
@@ -116,7 +119,7 @@ class ManeuverProblem(Section):
         return self
 
     @property
-    def platform(self) -> Platform:
+    def platform(self) -> Robot:
         """The robot's kinematics, body and footprint."""
         return loc8_smdw(self.robot.wheel)
 

@@ -30,7 +30,7 @@ from trajopt.report.style import (
     VERMILION,
     new_figure,
 )
-from trajopt.robots.platform import Platform
+from trajopt.robots.robot import Robot
 
 _SOURCE_COLOURS = (BLUE, ORANGE, GREY, GREEN)
 _WIDE = 0.8  # share of the room of a group that its bars take
@@ -248,7 +248,7 @@ class Motions:
     note: str
 
 
-def motions_figure(panels: Sequence[Motions], robot: Platform, columns: int = 3) -> Figure:
+def motions_figure(panels: Sequence[Motions], robot: Robot, columns: int = 3) -> Figure:
     """Paths of the robot's centre from above with its last outline; successes blue, the others
     vermilion."""
     rows = math.ceil(len(panels) / columns)
