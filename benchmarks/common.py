@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from trajopt.provenance import commit, processor, versions
+from trajopt.report.files import markdown
 
 ROOT = Path(__file__).resolve().parent.parent
 OUT = ROOT / "out" / "benchmarks"
@@ -56,7 +57,7 @@ def publish(
         for row in table.rows:
             shown.add_row(*row)
         console.print(shown)
-        text += [f"## {table.title}", "", *markdown(table), ""]
+        text += [f"## {table.title}", "", *markdown(table.header, table.rows), ""]
     text += [line for note in notes for line in (note, "")]
     for line in (*notes, where):
         console.print(line, highlight=False)
@@ -64,12 +65,6 @@ def publish(
     path.write_text("\n".join(text), encoding="utf-8")
     _write_csv(OUT / f"{name}.csv", tables, where)
     return path
-
-
-def markdown(table: ResultTable) -> list[str]:
-    """Lines of a Markdown table."""
-    lines = ["| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
-    return lines + ["| " + " | ".join(row) + " |" for row in table.rows]
 
 
 def _write_csv(path: Path, tables: Sequence[ResultTable], where: str) -> None:

@@ -21,6 +21,7 @@ from rich.progress import track
 from rich.table import Table
 
 from benchmarks.common import provenance
+from trajopt.report.files import markdown
 from trajopt.robots.robot import robot
 from trajopt.simulate.engine import ENGINES, Command, Recording, SimRobot, make_engine
 from trajopt.simulate.rollers import SHAPES, Shape
@@ -174,8 +175,7 @@ def write(rows: Sequence[Row], conditions: str, folder: Path) -> None:
         ("Worst over motions and speeds", SUMMARY_HEADER, summary(rows)),
         ("All runs", HEADER, [cells(row) for row in rows]),
     ):
-        lines += [f"## {title}", "", "| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-        lines += ["| " + " | ".join(line) + " |" for line in body] + [""]
+        lines += [f"## {title}", "", *markdown(header, body), ""]
     (folder / "rollers.md").write_text("\n".join(lines), encoding="utf-8")
 
 

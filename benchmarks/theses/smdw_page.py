@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from benchmarks.common import OUT, ResultTable, markdown
+from benchmarks.common import OUT, ResultTable
 from benchmarks.theses.smdw_figures import SOURCE_NAMES, phase_shares
+from trajopt.report.files import markdown
 from trajopt.report.intervals import wilson
 from trajopt.systems.smdw.trial_pictures import ClimbCell
 
@@ -252,7 +253,7 @@ class Page:
 
 
 def markdown_block(table: ResultTable) -> list[str]:
-    return ["\n".join(markdown(table))]
+    return ["\n".join(markdown(table.header, table.rows))]
 
 
 def correspondence() -> ResultTable:

@@ -4,6 +4,7 @@ solver."""
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,6 @@ from trajopt.errors import ArgumentError
 from trajopt.objectives.rollout import Kinematics
 from trajopt.objectives.terminal import (
     TerminalObjective,
-    on_grid,
     terminal_cost,
     terminal_objective,
     with_free,
@@ -67,7 +67,7 @@ def with_actuator(problem, *free):
 
 @pytest.mark.parametrize("steps", [48, 252, 2001])
 def test_without_limits_the_prediction_is_exact_on_any_grid(problem, steps):
-    objective = on_grid(terminal_objective(with_free(problem, "p1", "p2", "heading")), steps)
+    objective = replace(terminal_objective(with_free(problem, "p1", "p2", "heading")), steps=steps)
     rng = np.random.default_rng(1)
     for x in rng.uniform(*objective.bounds.T, (5, objective.dimension)):
         exact = objective.predict_exactly(x)
@@ -113,7 +113,7 @@ def test_step_averages_converge_to_the_exact_prediction(scenario):
     objective = terminal_objective(with_actuator(scenario, "p1", "p2", "heading"))
     exact = objective.score(objective.default).cost[0]
     errors = [
-        abs(on_grid(objective, n).evaluate(objective.default[None]).cost[0] - exact)
+        abs(replace(objective, steps=n).evaluate(objective.default[None]).cost[0] - exact)
         for n in (252, 2001, 20001)
     ]
     assert errors[2] < errors[0] / 20
@@ -209,7 +209,7 @@ def test_affine_needs_ideal_actuators(scenario):
 
 def test_steps_must_fit_the_segments(scenario):
     with pytest.raises(ArgumentError, match="multiple of the 3"):
-        on_grid(terminal_objective(scenario), 250).evaluate(np.zeros((1, 2)))
+        replace(terminal_objective(scenario), steps=250).evaluate(np.zeros((1, 2)))
 
 
 @settings(max_examples=10, deadline=None)

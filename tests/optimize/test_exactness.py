@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from smdw_problems import SMDW, smdw_problem
 
-from trajopt.objectives.terminal import folded, terminal_objective, with_free
+from trajopt.arrays import fold
+from trajopt.objectives.terminal import terminal_objective, with_free
 from trajopt.optimize.base import Budget, Status
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import Lattice, lattice_points
@@ -91,7 +92,7 @@ def test_without_lattice_points_the_best_of_the_box_is_found(scenario):
 def wheel_signs(objective, x):
     """Signs of the critical wheels' errors at x, nearest whole turns taken off."""
     part = objective.affine_part()
-    return tuple(np.sign(folded(part.matrix @ x + part.offset, part.period)).astype(int))
+    return tuple(np.sign(fold(part.matrix @ x + part.offset, part.period)).astype(int))
 
 
 @pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 1), (-1, -1)])

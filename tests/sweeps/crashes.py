@@ -33,6 +33,7 @@ import pandas as pd
 from tests.sweeps.run_functions import paced
 from trajopt.sweeps.executors import Engine, dask_local, processes
 from trajopt.sweeps.host import CaseLimits
+from trajopt.sweeps.rows import RUN_COLUMNS
 from trajopt.sweeps.slurm import SlurmOptions, submit
 from trajopt.sweeps.store import Store, open_store
 from trajopt.sweeps.sweeps import sweep, tabled
@@ -60,7 +61,10 @@ def digest(store: Store) -> str:
     """Hash of the sorted table without its columns of time, host and path, as CSV bytes, and of the
     arrays."""
     text = io.StringIO()
-    store.stable_table().to_pandas().to_csv(text, index=False)
+    table = store.table()
+    table.select(sorted(set(table.column_names) - set(RUN_COLUMNS))).to_pandas().to_csv(
+        text, index=False
+    )
     arrays = [pd.read_parquet(p) for p in store.parts("arrays")]
     if arrays:
         beside = pd.concat(arrays).drop_duplicates(["case", "name"]).sort_values(["case", "name"])

@@ -13,7 +13,7 @@ from scaling_cases import PATHS, ROBOTS, limit
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.timing.linear import linear_factor
-from trajopt.timing.scaling import rough_duration, start_speeds, time_scale
+from trajopt.timing.scaling import rough_duration, time_scale
 from trajopt.timing.segments import segment_factors
 from trajopt.timing.sensitivity import sensitivities
 from trajopt.timing.stages import fine_rows
@@ -62,19 +62,6 @@ def test_a_rough_duration_is_near_the_exact_one():
     assert rough_duration(PATHS["straight"], DRIVE) == pytest.approx(
         time_scale(PATHS["straight"], DRIVE).duration
     )
-
-
-def test_start_speeds_are_where_time_scaling_turns_infeasible():
-    limits = [
-        limit("speed", largest=2.0),
-        limit("wheel_acceleration", largest=3.0),
-        limit("slip", friction=0.2),
-    ]
-    low, high = start_speeds(PATHS["slalom"], limits, robot=ROBOTS["rear_cog"])
-    assert low == 0.0
-    time_scale(PATHS["slalom"], limits, robot=ROBOTS["rear_cog"], start_speed=0.999 * high)
-    with pytest.raises(InfeasibleError):
-        time_scale(PATHS["slalom"], limits, robot=ROBOTS["rear_cog"], start_speed=1.01 * high)
 
 
 def test_segments_lie_between_linear_and_the_optimum():

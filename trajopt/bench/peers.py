@@ -12,12 +12,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.errors import MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Budget, OptimizeResult, Progress, Run, Status, checked_bounds
+from trajopt.optimize.base import Run, Status
+from trajopt.optimize.method import Method, require_unconstrained
 
 _LARGE = 1e100  # stands for an infeasible evaluation
 EXAMPLE = {"c1": 0.5, "c2": 0.3, "w": 0.9}  # pyswarms 1.3 documentation, "Basic Optimization"
@@ -26,7 +26,7 @@ _FOREVER = 1_000_000  # iterations; the run's budget ends searches before
 
 
 @dataclass(frozen=True)
-class PySwarms:
+class PySwarms(Method):
     """pyswarms's GlobalBestPSO with its documentation's options.
 
     ``constriction``: the coefficients of our gbest PSO instead. ``equal``: also a start at rest and
@@ -44,22 +44,15 @@ class PySwarms:
     def name(self) -> str:
         return "pyswarms"
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,  # noqa: ARG002
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search; pyswarms knows no start and no constraints (ArgumentError)."""
-        box = _only_bounds(self.name, objective, bounds)
-        run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self._search(run, rng))
+    def _require(self, objective: Objective) -> None:
+        require_unconstrained(self.name, objective)
 
-    def _search(self, run: Run, rng: Generator) -> tuple[Status, str]:
+    def _search(
+        self,
+        run: Run,
+        x0: Array | None,  # noqa: ARG002 - knows no start
+        rng: Generator,
+    ) -> tuple[Status, str]:
         try:
             from pyswarms.single.global_best import GlobalBestPSO
         except ImportError:
@@ -86,7 +79,7 @@ class PySwarms:
 
 
 @dataclass(frozen=True)
-class Pymoo:
+class Pymoo(Method):
     """pymoo's PSO with its defaults (adaptive coefficients, random restarts off)."""
 
     name: ClassVar[str] = "pymoo-pso"
@@ -95,22 +88,15 @@ class Pymoo:
 
     particles: int = 50
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,  # noqa: ARG002
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search; constraints are not passed on (ArgumentError)."""
-        box = _only_bounds(self.name, objective, bounds)
-        run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self._search(run, rng))
+    def _require(self, objective: Objective) -> None:
+        require_unconstrained(self.name, objective)
 
-    def _search(self, run: Run, rng: Generator) -> tuple[Status, str]:
+    def _search(
+        self,
+        run: Run,
+        x0: Array | None,  # noqa: ARG002 - knows no start
+        rng: Generator,
+    ) -> tuple[Status, str]:
         try:
             from pymoo.algorithms.soo.nonconvex.pso import PSO
             from pymoo.core.problem import Problem
@@ -130,14 +116,6 @@ class Pymoo:
             seed=int(rng.integers(2**31)),
         )
         return Status.CONVERGED, "pymoo's stopping rule is met"
-
-
-def _only_bounds(name: str, objective: Objective, bounds: ArrayLike) -> Array:
-    if objective.constrained:
-        raise ArgumentError(
-            "optimizer", name, "a method that handles constraints for this objective: pso"
-        )
-    return checked_bounds(bounds, objective.dimension)
 
 
 def constriction_pyswarms() -> PySwarms:

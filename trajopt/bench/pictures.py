@@ -14,6 +14,7 @@ from matplotlib.ticker import NullFormatter
 from trajopt.arrays import Array
 from trajopt.bench.profiles import data_profile, ecdf, holm, performance_profile
 from trajopt.bench.tables import GRADIENT_METHODS, NEAR, SOLVED, BenchTables, Share
+from trajopt.report.files import markdown
 from trajopt.report.style import (
     BLACK,
     BLUE,
@@ -83,7 +84,7 @@ def write_report(store: Store, out: Path) -> Path:
         "",
         "## Best known costs",
         "",
-        *_markdown(
+        *markdown(
             ("problem", "best cost", "found by"),
             [(name, f"{cost:.6g}", who) for name, (cost, who) in tables.best.items()],
         ),
@@ -141,7 +142,7 @@ def answer_lines(tables: BenchTables) -> list[str]:
         "best peer's PSO",
         "PSO or gradients",
     )
-    text = _markdown(header, rows)
+    text = markdown(header, rows)
     text += [
         "",
         f"In brackets: searches solved (at most {SOLVED:g} of the way from a median random point to the best "
@@ -229,7 +230,7 @@ def peer_lines(tables: BenchTables) -> list[str]:
             "p (Holm)",
             "significantly worse",
         )
-        text += [*_markdown(header, rows), ""]
+        text += [*markdown(header, rows), ""]
     return text[:-1] or ["Not in this benchmark."]
 
 
@@ -262,7 +263,7 @@ def share_lines(tables: BenchTables, out: Path) -> list[str]:
         f"Searches solved (to {SOLVED:g}), nearly solved (to {NEAR:g}), and the median share left. Empty: the "
         "optimizer does not work on this family.",
         "",
-        *_markdown(("optimizer", *shares), rows),
+        *markdown(("optimizer", *shares), rows),
     ]
 
 
@@ -285,7 +286,7 @@ def _running_table(tables: BenchTables, out: Path) -> list[str]:
         f"Evaluations until {PROFILE_SHARE:g} is left, failures counted (inf where no search got there: "
         "expected_running_time.csv has all rows).",
         "",
-        *_markdown(header, reached),
+        *markdown(header, reached),
     ]
 
 
@@ -312,7 +313,7 @@ def _construction(tables: BenchTables, out: Path) -> list[str]:
         "Median seconds to load, build and compile before the first search of a process, apart from all other "
         "figures.",
         "",
-        *_markdown(("optimizer", *families), rows),
+        *markdown(("optimizer", *families), rows),
     ]
 
 
@@ -331,7 +332,7 @@ def _failures(tables: BenchTables) -> list[str]:
         for r in tables.failed
     ]
     shown = rows[:40]
-    text = _markdown(
+    text = markdown(
         ("problem", "optimizer", "seed", "status", "failed evaluations", "first reason"), shown
     )
     return (
@@ -404,14 +405,7 @@ def _profile_figure(tables: BenchTables, out: Path) -> tuple[str, str]:
         ratios = np.geomspace(1.0, 1e4, 200)
         curves = performance_profile(tables.times("seconds", [PROFILE_SHARE])[..., 0], ratios)
         for k, name in enumerate(tables.optimizers):
-            right.step(
-                ratios,
-                curves[:, k],
-                color=_COLOURS[k % 8],
-                ls=_DASHES[k // 8 % 3],
-                label=name,
-                where="post",
-            )
+            _steps(right, ratios, curves[:, k], k, name)
         right.set_xscale("log")
         right.set_xlabel("seconds / seconds of the fastest")
         right.set_title("performance profile")
@@ -446,14 +440,7 @@ def _family_figure(tables: BenchTables, out: Path) -> tuple[str, str]:
             curves = ecdf(part, budgets)
             for i, k in enumerate(chosen):
                 shown = _SHOWN.index(tables.optimizers[k])
-                axes.step(
-                    budgets,
-                    curves[:, i],
-                    color=_COLOURS[shown % 8],
-                    ls=_DASHES[shown // 8 % 3],
-                    label=tables.optimizers[k],
-                    where="post",
-                )
+                _steps(axes, budgets, curves[:, i], shown, tables.optimizers[k])
         for axes in grid[len(families) :]:
             axes.set_axis_off()
         handles, labels = grid[0].get_legend_handles_labels()
@@ -477,16 +464,15 @@ def _curves(
     budgets = np.geomspace(finite.min() * scale, finite.max(), 200)
     curves = share(times, budgets)
     for k, name in enumerate(tables.optimizers):
-        axes.step(
-            budgets,
-            curves[:, k],
-            color=_COLOURS[k % 8],
-            ls=_DASHES[k // 8 % 3],
-            label=name,
-            where="post",
-        )
+        _steps(axes, budgets, curves[:, k], k, name)
     axes.set_xscale("log")
     axes.set_ylim(0.0, 1.02)
+
+
+def _steps(axes: Axes, x: Array, y: Array, place: int, name: str) -> None:
+    """One optimizer's step curve; its ``place`` in the order chooses colour and dash."""
+    style = {"color": _COLOURS[place % 8], "ls": _DASHES[place // 8 % 3]}
+    axes.step(x, y, label=name, where="post", **style)  # type: ignore[arg-type]
 
 
 def _saved(figure: object, out: Path, name: str) -> str:
@@ -501,11 +487,6 @@ def small_picture(source: Path, target: Path) -> None:
 
     with Image.open(source) as picture:
         picture.convert("RGB").quantize(_SMALL_COLOURS).save(target, optimize=True)
-
-
-def _markdown(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return lines + ["| " + " | ".join(row) + " |" for row in rows]
 
 
 def _write_csv(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

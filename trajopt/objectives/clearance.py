@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
+from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
+from trajopt.objectives.on_terminal import OnTerminal
 from trajopt.objectives.rollout import step_grid
-from trajopt.objectives.terminal import TerminalObjective
-from trajopt.paths.path import Path
 from trajopt.world.free_ground import FreeGround, path_margin
 
 SEARCH_STEPS = 36  # steps along the path in a search, chosen: 6 cm on a 2 m path
@@ -29,25 +28,12 @@ RESERVE = (
 
 
 @dataclass(frozen=True)
-class ClearObjective:
+class ClearObjective(OnTerminal):
     """A terminal objective whose violation says how far the footprint leaves its free ground
     (m)."""
 
-    terminal: TerminalObjective
     ground: FreeGround
     steps: int = SEARCH_STEPS
-
-    @property
-    def dimension(self) -> int:
-        return self.terminal.dimension
-
-    @property
-    def bounds(self) -> Array:
-        return self.terminal.bounds
-
-    @property
-    def constrained(self) -> bool:
-        return True
 
     @property
     def provides(self) -> frozenset[Capability]:
@@ -56,10 +42,6 @@ class ClearObjective:
     @cached_property
     def _values(self) -> Array:
         return step_grid(self.terminal.basis, self.steps).node_value
-
-    def path(self, candidate: Array) -> Path:
-        """The path through the control points of one candidate (d,)."""
-        return self.terminal.path(candidate)
 
     def margins(self, candidates: Array) -> Array:
         """(n,): least distance (m) from any border along the path of each candidate (n, d), search
@@ -85,21 +67,6 @@ class ClearObjective:
 
     # -- what the lattice, Newton and IPOPT ask for: the terminal objective's own
     # ------------------------
-
-    def residuals(self, z: Any, turns: Any, *, exact: bool = False) -> list[Any]:
-        return self.terminal.residuals(z, turns, exact=exact)
-
-    def residual_gains(self) -> Array:
-        return self.terminal.residual_gains()
-
-    def nearest_turns(self, candidates: Array) -> Array:
-        return self.terminal.nearest_turns(candidates)
-
-    def coarse(self) -> TerminalObjective:
-        return self.terminal.coarse()
-
-    def affine_part(self) -> AffinePart:
-        return self.terminal.affine_part()
 
     def effort(self, candidates: Array) -> Array:
         """(n,): peak wheel rate; candidates that leave the free ground come after all that stay

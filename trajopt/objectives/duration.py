@@ -8,48 +8,29 @@ picks the fastest solution; population methods handle it by Deb's rule.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from trajopt.arrays import Array, fold
 from trajopt.errors import InfeasibleError
-from trajopt.objectives.base import AffinePart, Capability, Evaluation
-from trajopt.objectives.terminal import TerminalObjective
-from trajopt.paths.path import Path
+from trajopt.objectives.base import Capability, Evaluation
+from trajopt.objectives.on_terminal import OnTerminal
 from trajopt.timing.scaling import time_scale
 
 SEARCH_GRIDPOINTS = 60  # of the time scaling inside a search; the score uses the full grid. Chosen
 
 
 @dataclass(frozen=True)
-class DurationObjective:
+class DurationObjective(OnTerminal):
     """Duration (s) over the free control values of ``terminal``'s problem, wheel angles as a
     constraint."""
 
-    terminal: TerminalObjective
     gridpoints: int = SEARCH_GRIDPOINTS
-
-    @property
-    def dimension(self) -> int:
-        return self.terminal.dimension
-
-    @property
-    def bounds(self) -> Array:
-        return self.terminal.bounds
-
-    @property
-    def constrained(self) -> bool:
-        return True
 
     @property
     def provides(self) -> frozenset[Capability]:
         offered = {Capability.BATCH, Capability.RESIDUALS}
         return frozenset(offered | ({Capability.AFFINE} if self.terminal.is_affine else set()))
-
-    def path(self, candidate: Array) -> Path:
-        """The path through the control points of one candidate (d,)."""
-        return self.terminal.path(candidate)
 
     def _duration(self, candidate: Array, gridpoints: int | None) -> float:
         """Least duration, s; inf where the limits allow no motion along this path."""
@@ -98,21 +79,6 @@ class DurationObjective:
     # -- the lattice, through the terminal objective
     # --------------------------------------------------
 
-    def affine_part(self) -> AffinePart:
-        return self.terminal.affine_part()
-
     def effort(self, candidates: Array) -> Array:
         """(n,): duration, s; ranks exact solutions."""
         return np.array([self._duration(row, self.gridpoints) for row in candidates])
-
-    def residuals(self, z: Any, turns: Any, *, exact: bool = False) -> list[Any]:
-        return self.terminal.residuals(z, turns, exact=exact)
-
-    def residual_gains(self) -> Array:
-        return self.terminal.residual_gains()
-
-    def nearest_turns(self, candidates: Array) -> Array:
-        return self.terminal.nearest_turns(candidates)
-
-    def coarse(self) -> TerminalObjective:
-        return self.terminal.coarse()

@@ -23,9 +23,8 @@ from trajopt.objectives.swarm import (
     LANES,
     MAX_INCREMENT,
     STRICT,
-    Goal,
+    CompiledSwarm,
     step_travel,
-    terminal_costs,
     turned,
 )
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
@@ -190,18 +189,10 @@ def _swarm(co, first, inverse, forward, z, places, fixed, limits, start, out):  
 
 
 @dataclass(frozen=True)
-class HeadingSwarm:
-    """Compiled prediction and cost for one problem whose heading may be free; ``prepared`` makes
-    it."""
+class HeadingSwarm(CompiledSwarm):
+    """For a heading that may be free; ``prepared`` makes it."""
 
-    coefficients: Array  # (steps, 33)
-    first: Array  # (6,)
-    inverse: Array
-    forward: Array
-    places: IntArray
-    fixed: Array
-    limits: Array
-    start: Array  # (7,)
+    first: Array  # (6,), as ``_swarm`` says
     ends: Array  # (2,) start and goal heading, rad
     width: float  # of a step, in spline parameter
 
@@ -217,10 +208,7 @@ class HeadingSwarm:
             3.0 * steepest * self.width < MAX_INCREMENT
         )  # a natural cubic: at most 3 times its chord's slope
 
-    def predict(self, candidates: Array) -> Array:
-        """(7, n): final x, y (m), yaw and wheel travel (rad) of candidates (n, d)."""
-        z = np.ascontiguousarray(candidates, dtype=np.float64)
-        out = np.empty((7, len(z)))
+    def _fill(self, z: Array, out: Array) -> None:
         _swarm(
             self.coefficients,
             self.first,
@@ -233,21 +221,6 @@ class HeadingSwarm:
             self.start,
             out,
         )
-        return out
-
-    def cost(self, candidates: Array, goal: Goal) -> Array:
-        """(n,): terminal cost of candidates (n, d)."""
-        cost = np.empty(len(candidates))
-        terminal_costs(
-            self.predict(candidates),
-            goal.pose,
-            goal.gains,
-            goal.travel,
-            goal.wheel_gains,
-            goal.period,
-            cost,
-        )
-        return cost
 
 
 def prepared(
@@ -302,13 +275,13 @@ def prepared(
     start = np.array([x[0], y[0], yaw[3], 0.0, 0.0, 0.0, 0.0])
     return HeadingSwarm(
         np.ascontiguousarray(np.column_stack(parts)),
-        first,
         np.ascontiguousarray(kinematics.inverse),
         np.ascontiguousarray(kinematics.forward),
         places,
         np.array([x[1], y[1], x[2], y[2], yaw[1], yaw[2], duration]),
         limits,
         start,
+        first,
         yaw[[0, 3]],
         grid.width,
     )

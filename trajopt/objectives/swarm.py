@@ -10,6 +10,7 @@ other. A test holds the result together with ``rollout.roll_out`` to 1e-12.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numba
@@ -165,11 +166,10 @@ class Goal:
 
 
 @dataclass(frozen=True)
-class PrescribedSwarm:
-    """Compiled prediction and cost for one problem whose heading is prescribed; ``prepared`` makes
-    it."""
+class CompiledSwarm(ABC):
+    """Prediction and cost of candidates of one problem, by a kernel over constants of each step."""
 
-    coefficients: Array  # (steps, 34)
+    coefficients: Array  # (steps, ...)
     inverse: Array
     forward: Array
     places: IntArray
@@ -177,25 +177,19 @@ class PrescribedSwarm:
     limits: Array
     start: Array  # (7,)
 
-    def fits(self, candidates: Array) -> bool:  # noqa: ARG002 - as of ``heading_swarm``
-        """Whether the kernel applies: always, the heading is prescribed."""
-        return True
+    @abstractmethod
+    def fits(self, candidates: Array) -> bool:
+        """Whether the kernel applies to candidates (n, d)."""
+
+    @abstractmethod
+    def _fill(self, z: Array, out: Array) -> None:
+        """Final states of candidates ``z`` (n, d) into ``out`` (7, n)."""
 
     def predict(self, candidates: Array) -> Array:
         """(7, n): final x, y (m), yaw and wheel travel (rad) of candidates (n, d)."""
         z = np.ascontiguousarray(candidates, dtype=np.float64)
         out = np.empty((7, len(z)))
-        _swarm(
-            self.coefficients,
-            self.inverse,
-            self.forward,
-            z,
-            self.places,
-            self.fixed,
-            self.limits,
-            self.start,
-            out,
-        )
+        self._fill(z, out)
         return out
 
     def cost(self, candidates: Array, goal: Goal) -> Array:
@@ -211,6 +205,28 @@ class PrescribedSwarm:
             cost,
         )
         return cost
+
+
+@dataclass(frozen=True)
+class PrescribedSwarm(CompiledSwarm):
+    """For a prescribed heading; ``prepared`` makes it."""
+
+    def fits(self, candidates: Array) -> bool:  # noqa: ARG002
+        """Always: nothing that a candidate holds turns the robot."""
+        return True
+
+    def _fill(self, z: Array, out: Array) -> None:
+        _swarm(
+            self.coefficients,
+            self.inverse,
+            self.forward,
+            z,
+            self.places,
+            self.fixed,
+            self.limits,
+            self.start,
+            out,
+        )
 
 
 def prepared(

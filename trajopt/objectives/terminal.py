@@ -468,8 +468,3 @@ def terminal_objective(problem: Problem, *, steps: int = SEARCH_STEPS) -> Termin
 def with_free(problem: Problem, *free: str) -> Problem:
     """The same problem with other free control values."""
     return problem.replace({"spline.free": list(free)})
-
-
-def on_grid(objective: TerminalObjective, steps: int) -> TerminalObjective:
-    """The same objective on another search grid."""
-    return replace(objective, steps=steps)

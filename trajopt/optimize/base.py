@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import ClassVar, Literal, NoReturn, Protocol
+from typing import Literal, NoReturn, Protocol
 
 import numpy as np
 from numpy.random import Generator
@@ -126,9 +126,14 @@ class Optimizer(Protocol):
     """A search method. ``needs`` lists what it asks of an objective; ``stochastic`` whether seeds
     matter."""
 
-    name: ClassVar[str]
-    needs: ClassVar[frozenset[Capability]]
-    stochastic: ClassVar[bool]
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def needs(self) -> frozenset[Capability]: ...
+
+    @property
+    def stochastic(self) -> bool: ...
 
     def minimize(
         self,

@@ -8,25 +8,20 @@ from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.errors import MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
 from trajopt.optimize.base import (
     FEASIBLE,
-    Budget,
-    OptimizeResult,
-    Progress,
     Run,
     Status,
-    checked_bounds,
-    checked_x0,
 )
+from trajopt.optimize.method import Method
 
 
 @dataclass(frozen=True)
-class CmaEs:
+class CmaEs(Method):
     """Covariance matrix adaptation, restarted with twice the population when it has converged
     (IPOP).
 
@@ -40,26 +35,11 @@ class CmaEs:
     sigma: float = 0.3  # of the width; pycma's documentation: about a quarter of the search range
     restarts: int = 9  # pycma's documentation of IPOP
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search. Raises MissingDependencyError without pycma."""
-        box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget, progress)
-        start = checked_x0(x0, box)
-        package = _package()
-        return run.finish(self.name, lambda: self._search(package, run, start, rng))
+    def _require(self, objective: Objective) -> None:  # noqa: ARG002
+        _package()
 
-    def _search(
-        self, package: Any, run: Run, x0: Array | None, rng: Generator
-    ) -> tuple[Status, str]:
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        package = _package()
         low, width = run.bounds[:, 0], run.bounds[:, 1] - run.bounds[:, 0]
         d = len(low)
         if x0 is not None:  # pycma samples around its start without evaluating it

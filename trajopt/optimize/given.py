@@ -6,51 +6,33 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import Capability, Objective
+from trajopt.objectives.base import Capability
 from trajopt.optimize.base import (
-    Budget,
-    OptimizeResult,
-    Progress,
     Run,
     Status,
-    checked_bounds,
-    checked_x0,
 )
+from trajopt.optimize.method import Method
 
 
 @dataclass(frozen=True)
-class Given:
+class Given(Method):
     """Evaluates ``x0`` and returns it."""
 
     name: ClassVar[str] = "given"
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = False
 
-    def minimize(
+    def _search(
         self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
+        run: Run,
+        x0: Array | None,
         rng: Generator,  # noqa: ARG002 - the contract has it
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """The result at ``x0`` (d,). Raises ArgumentError without one, or for one outside the
-        bounds."""
-        box = checked_bounds(bounds, objective.dimension)
-        point = checked_x0(x0, box)
-        if point is None:
-            raise ArgumentError(
-                "x0", None, f"the candidate to judge, {objective.dimension} numbers"
-            )
-        run = Run(objective, box, budget, progress)
-
-        def judged() -> tuple[Status, str]:
-            run.evaluate(point[None])
-            return Status.CONVERGED, "given, not searched"
-
-        return run.finish(self.name, judged)
+    ) -> tuple[Status, str]:
+        if x0 is None:
+            count = run.objective.dimension
+            raise ArgumentError("x0", None, f"the candidate to judge, {count} numbers")
+        run.evaluate(x0[None])
+        return Status.CONVERGED, "given, not searched"

@@ -17,35 +17,32 @@ from typing import Any, ClassVar, cast
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import (
     Capability,
     LatticeObjective,
-    Objective,
     ResidualObjective,
     SymbolicObjective,
     SymbolicProblem,
 )
 from trajopt.optimize.base import (
-    Budget,
-    OptimizeResult,
-    Progress,
     Run,
     Starts,
     Status,
-    checked_bounds,
-    checked_x0,
 )
 from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
+from trajopt.optimize.method import Method
 from trajopt.optimize.newton import solve_residuals
 
 
 @dataclass(frozen=True)
-class Ipopt:
-    """IPOPT from several starts.
+class Ipopt(Method):
+    """IPOPT from several starts, on objectives that can be written in symbols.
+
+    ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the history, and the
+    polish; ``ngev`` and ``nhev`` count its gradients and Hessians.
 
     ``starts``: number of starts in all. ``lattice_starts``: how many of them may be lattice points.
     ``polish``: Newton on the residuals after each start. ``stop_when_exact``: skip the remaining
@@ -63,29 +60,9 @@ class Ipopt:
     polish: bool = True
     stop_when_exact: bool = True
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search. ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the
-        history, and the polish; ``ngev`` and ``nhev`` count its gradients and Hessians. Raises
-        ArgumentError when the objective cannot be written in symbols."""
-        box = checked_bounds(bounds, objective.dimension)
-        start = checked_x0(x0, box)
-        run = Run(objective, box, budget, progress)
-        program = _Program.of(self, run, cast(SymbolicObjective, objective))
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        program = _Program.of(self, run, cast(SymbolicObjective, run.objective))
         run.constructed()
-        return run.finish(self.name, lambda: self._search(run, program, start, rng))
-
-    def _search(
-        self, run: Run, program: _Program, x0: Array | None, rng: Generator
-    ) -> tuple[Status, str]:
         residual = Capability.RESIDUALS in run.objective.provides
         successes, starts = 0, Starts(run)
         for start in self._starts(run, x0, rng):

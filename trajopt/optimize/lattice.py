@@ -14,21 +14,16 @@ from typing import ClassVar, cast
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, LatticeObjective, Objective
 from trajopt.optimize.base import (
-    Budget,
-    OptimizeResult,
-    Progress,
     Run,
     Status,
     best_index,
-    checked_bounds,
-    checked_x0,
 )
+from trajopt.optimize.method import Method
 from trajopt.optimize.newton import solve_residuals
 
 EXACT = 1e-9  # cost, or wheel error in rad, up to which a solution counts as exact
@@ -40,12 +35,13 @@ _BATCH = 100  # candidates evaluated at once, chosen
 
 
 @dataclass(frozen=True)
-class Lattice:
+class Lattice(Method):
     """Closed form over whole turns, then damped minimum-norm Newton where actuators limit the
     wheels.
 
     ``rounds``: how often Newton may go through all lattice points; from the second time on they are
-    those nearest to a random base point.
+    those nearest to a random base point. Refuses an objective without an affine part, or one whose
+    wheel angles no free variable changes (ArgumentError).
     """
 
     name: ClassVar[str] = "lattice"
@@ -54,22 +50,7 @@ class Lattice:
 
     rounds: int = 5  # chosen
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Solve. ``x0`` is checked but not used: the method needs no start. ``rng`` draws base
-        points for later rounds.
-
-        Raises ArgumentError for an objective without an affine part, or one whose wheel angles no
-        free variable changes.
-        """
+    def _require(self, objective: Objective) -> None:
         if not hasattr(objective, "affine_part"):
             raise ArgumentError(
                 "optimizer",
@@ -77,14 +58,14 @@ class Lattice:
                 "an objective with affine wheel angles (the terminal "
                 "objective); take pso or differential-evolution here",
             )
-        box = checked_bounds(bounds, objective.dimension)
-        checked_x0(x0, box)
-        run = Run(objective, box, budget, progress)
-        return run.finish(
-            self.name, lambda: self._search(run, cast(LatticeObjective, objective), rng)
-        )
 
-    def _search(self, run: Run, objective: LatticeObjective, rng: Generator) -> tuple[Status, str]:
+    def _search(
+        self,
+        run: Run,
+        x0: Array | None,  # noqa: ARG002 - needs no start
+        rng: Generator,
+    ) -> tuple[Status, str]:
+        objective = cast(LatticeObjective, run.objective)
         part = objective.affine_part()
         if Capability.AFFINE not in objective.provides and not has_influence(part):
             return self._through_actuators(run, objective, part, part.base[None], rng)

@@ -8,21 +8,16 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.errors import MissingDependencyError
 from trajopt.objectives.base import Capability, Objective
 from trajopt.optimize.base import (
-    Budget,
-    OptimizeResult,
-    Progress,
     Run,
     Starts,
     Status,
-    checked_bounds,
-    checked_x0,
 )
+from trajopt.optimize.method import Method, require_unconstrained
 
 _ALGORITHMS = {"direct": "GN_ORIG_DIRECT_L", "bobyqa": "LN_BOBYQA"}
 _LARGE = 1e100  # stands for an infeasible evaluation
@@ -30,7 +25,7 @@ _STEP = 0.1  # of the width: BOBYQA's first step, chosen
 
 
 @dataclass(frozen=True)
-class NLopt:
+class NLopt(Method):
     """One of NLopt's derivative-free methods, on variables scaled to [0, 1].
 
     "direct" divides the bounds into ever smaller rectangles (Gablonsky's locally biased form) and
@@ -54,33 +49,12 @@ class NLopt:
     def stochastic(self) -> bool:
         return self.method == "bobyqa"
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search. Raises MissingDependencyError without NLopt, ArgumentError for a constrained
-        objective."""
-        if objective.constrained:
-            raise ArgumentError(
-                "optimizer",
-                self.name,
-                "a method that handles constraints for this objective: "
-                "pso, cma-es, differential-evolution, slsqp or trust-constr",
-            )
-        box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget, progress)
-        start, package = checked_x0(x0, box), _package()
-        return run.finish(self.name, lambda: self._search(package, run, start, rng))
+    def _require(self, objective: Objective) -> None:
+        require_unconstrained(self.name, objective)
+        _package()
 
-    def _search(
-        self, package: Any, run: Run, x0: Array | None, rng: Generator
-    ) -> tuple[Status, str]:
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        package = _package()
         low, width = run.bounds[:, 0], run.bounds[:, 1] - run.bounds[:, 0]
         d = len(low)
         ended: list[Exception] = []

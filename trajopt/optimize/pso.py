@@ -25,17 +25,16 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import Capability, Objective
+from trajopt.objectives.base import Capability
 from trajopt.optimize.base import (
-    Budget,
-    OptimizeResult,
-    Progress,
     Run,
     Status,
     checked_bounds,
     checked_x0,
 )
+from trajopt.optimize.method import Method
 from trajopt.optimize.swarm import Swarm, SwarmRules
 
 Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
@@ -48,8 +47,8 @@ _CHOICES = {
 
 
 @dataclass(frozen=True)
-class ParticleSwarm:
-    """PSO. Defaults are the constriction PSO with a global best; the functions below are presets.
+class ParticleSwarm(Method):
+    """PSO; a start (d,) becomes the first particle's position. Defaults are the constriction PSO with a global best; the functions below are presets.
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position
     inside 0.9 of the space (thesis 000, Table 5.4) and stops the particle; "reflect" mirrors it
@@ -104,32 +103,13 @@ class ParticleSwarm:
         if self.stagnation is not None and self.stagnation < 1:
             raise ArgumentError("stagnation", self.stagnation, "at least 1 iteration, or None")
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search until the budget ends or, without ``restart``, the swarm stagnates or collapses to
-        one point.
-
-        ``x0`` (d,) becomes the first particle's position.
-        """
-        box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget, progress)
-
-        def search() -> tuple[Status, str]:
-            ended = self._search(run, self.swarm(box, rng, x0=x0))
-            while self.restart:
-                best = None if run.best_x is None else np.clip(run.best_x, box[:, 0], box[:, 1])
-                self._search(run, self.swarm(box, rng, x0=best))
-            return ended
-
-        return run.finish(self.name, search)
+    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        box = run.bounds
+        ended = self._flight(run, self.swarm(box, rng, x0=x0))
+        while self.restart:
+            best = None if run.best_x is None else np.clip(run.best_x, box[:, 0], box[:, 1])
+            self._flight(run, self.swarm(box, rng, x0=best))
+        return ended
 
     def swarm(self, bounds: ArrayLike, rng: Generator, *, x0: ArrayLike | None = None) -> Swarm:
         """A swarm of one's own to drive: ``x = swarm.ask()``, evaluate, ``swarm.tell(cost,
@@ -154,7 +134,7 @@ class ParticleSwarm:
             checked_x0(x0, box),
         )
 
-    def _search(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
+    def _flight(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
         unseen = 0  # iterations in a row without a particle inside
         inside = self.boundary != "none"
         while True:

@@ -9,21 +9,15 @@ from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective, ResidualObjective
 from trajopt.optimize.base import (
-    Budget,
-    OptimizeResult,
-    Progress,
     Run,
     Starts,
     Status,
-    checked_bounds,
-    checked_x0,
 )
+from trajopt.optimize.method import Method, require_unconstrained
 
 _LARGE = 1e100  # stands for an infeasible evaluation, since line searches cannot work with inf
 
@@ -52,7 +46,7 @@ class _Point:
 
 
 @dataclass(frozen=True)
-class ScipyLocal:
+class ScipyLocal(Method):
     """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from
     random points.
 
@@ -72,28 +66,9 @@ class ScipyLocal:
     def name(self) -> str:
         return self.method.lower()
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search from each start in turn. Raises ArgumentError for a constrained objective where
-        the method knows only bounds (l-bfgs-b, nelder-mead)."""
-        if objective.constrained and self.method in ("L-BFGS-B", "Nelder-Mead"):
-            raise ArgumentError(
-                "optimizer",
-                self.name,
-                "a method that handles constraints for this objective: "
-                "pso, differential-evolution, slsqp or trust-constr",
-            )
-        box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
+    def _require(self, objective: Objective) -> None:
+        if self.method in ("L-BFGS-B", "Nelder-Mead"):  # which know only bounds
+            require_unconstrained(self.name, objective)
 
     def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         from scipy import optimize
@@ -133,7 +108,7 @@ class ScipyLocal:
 
 
 @dataclass(frozen=True)
-class DifferentialEvolution:
+class DifferentialEvolution(Method):
     """scipy.optimize.differential_evolution with its own defaults, ``population`` as popsize."""
 
     name: ClassVar[str] = "differential-evolution"
@@ -144,22 +119,6 @@ class DifferentialEvolution:
     tolerance: float = (
         1e-12  # SciPy's tol on the population's spread; tight, because budgets end searches
     )
-
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search until the population has collapsed or the budget ends, then SciPy's local
-        polish."""
-        box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
 
     def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         from scipy import optimize
@@ -193,34 +152,15 @@ class DifferentialEvolution:
 
 
 @dataclass(frozen=True)
-class DualAnnealing:
+class DualAnnealing(Method):
     """scipy.optimize.dual_annealing with its own defaults (generalised annealing and L-BFGS-B)."""
 
     name: ClassVar[str] = "dual-annealing"
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
 
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search until the budget ends. Raises ArgumentError for a constrained objective."""
-        if objective.constrained:
-            raise ArgumentError(
-                "optimizer",
-                self.name,
-                "a method that handles constraints for this objective: "
-                "pso, differential-evolution, slsqp or trust-constr",
-            )
-        box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
+    def _require(self, objective: Objective) -> None:
+        require_unconstrained(self.name, objective)
 
     def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         from scipy import optimize
@@ -238,7 +178,7 @@ class DualAnnealing:
 
 
 @dataclass(frozen=True)
-class LeastSquares:
+class LeastSquares(Method):
     """scipy.optimize.least_squares (trust-region reflective) on the gain-weighted residuals, whole
     turns fixed.
 
@@ -252,21 +192,6 @@ class LeastSquares:
 
     starts: int = 20  # chosen
     tolerance: float = 1e-15  # SciPy's xtol, ftol and gtol; tight, because budgets end searches
-
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult:
-        """Search from each start in turn."""
-        box = checked_bounds(bounds, objective.dimension)
-        run = Run(objective, box, budget, progress)
-        return run.finish(self.name, lambda: self._search(run, checked_x0(x0, box), rng))
 
     def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         from scipy import optimize

@@ -71,18 +71,7 @@ def follow(
     """
     if manner not in ("below", "least_squares"):
         raise ArgumentError("manner", manner, "below or least_squares")
-    if manner == "below":
-        found = time_scale(
-            path,
-            [*limits, profile],
-            robot=robot,
-            ground=ground,
-            start_speed=start_speed,
-            end_speed=end_speed,
-            start_wheels=start_wheels,
-        )
-        return Followed(found, np.interp(found.s, profile.places, profile.speeds))
-    warm = time_scale(
+    below = time_scale(
         path,
         [*limits, profile],
         robot=robot,
@@ -91,8 +80,10 @@ def follow(
         end_speed=end_speed,
         start_wheels=start_wheels,
     )
+    if manner == "below":
+        return Followed(below, np.interp(below.s, profile.places, profile.speeds))
     return _least_squares(
-        path, profile, tuple(limits), robot, Flat() if ground is None else ground, warm
+        path, profile, tuple(limits), robot, Flat() if ground is None else ground, below
     )
 
 

@@ -37,7 +37,7 @@ from trajopt.sweeps.merging import (
     one_row_a_case,
     united,
 )
-from trajopt.sweeps.rows import DONE, RUN_COLUMNS, arrow
+from trajopt.sweeps.rows import DONE, arrow
 
 FORMAT = 1
 _FOLDERS = ("temporary", "parts", "arrays", "runs", "jobs")  # the first marks a store
@@ -104,12 +104,6 @@ class Store:
         damaged part.
         """
         return one_row_a_case(self._union("parts", columns))
-
-    def stable_table(self) -> Any:
-        """``table`` without the columns of time, host and path: equal for equal sweeps, however
-        they ran."""
-        table = self.table()
-        return table.select(sorted(n for n in table.column_names if n not in RUN_COLUMNS))
 
     def frame(self, columns: Sequence[str] | None = None) -> Any:
         """``table`` as a pandas data frame."""

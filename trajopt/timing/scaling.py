@@ -15,9 +15,8 @@ from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.paths.samples import require_moving, sample_at
 from trajopt.robots.robot import Robot
-from trajopt.timing.compiled import controllable_sets
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
-from trajopt.timing.feasibility import allowed_end, require_motion
+from trajopt.timing.feasibility import require_motion
 from trajopt.timing.grid import initial_grid, insert, split
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
@@ -141,29 +140,6 @@ def rough_duration(
     return float(
         np.sum(2 * np.diff(fine.s) / (speed[1:] + speed[:-1]))
     )  # s'' is constant between gridpoints
-
-
-def start_speeds(
-    path: Path,
-    limits: Sequence[Limit],
-    *,
-    robot: Robot | None = None,
-    ground: Terrain | None = None,
-    end_speed: float = 0.0,
-    gridpoints: int | ArrayLike | None = None,
-) -> tuple[float, float]:
-    """Lowest and highest start speed (m/s) from which the end of the path can be reached within
-    limits.
-
-    Raises as ``time_scale``.
-    """
-    job = _job(path, limits, robot, ground, (0.0, end_speed), "auto", ())
-    u = initial_grid(path, gridpoints)
-    _require_drivable(job, u)
-    _, stages = _with_edges(job, u, 0.0)
-    end = allowed_end(stages, job.end)
-    low, high = np.sqrt(controllable_sets(stages, end, end)[0])
-    return float(low), float(high)
 
 
 def _job(
