@@ -24,7 +24,8 @@ from trajopt.optimize.base import Budget, OptimizeResult
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
-from trajopt.problem.search import Problem, load_problem, problem_kind
+from trajopt.problem import Problem, load_problem
+from trajopt.systems.smdw.thesis import DURATIONS, through_drives
 
 PACKAGES = ("trajopt", "numpy", "scipy", "numba", "casadi", "pyswarms")
 EQUAL = 1e-9  # costs below this count as equal, chosen: exact to rounding
@@ -34,11 +35,6 @@ PYSWARMS_OPTIONS = {
     "c2": 0.3,
     "w": 0.9,
 }  # pyswarms 1.3 documentation, "Basic Optimization"
-HARD_LIMITS = {
-    "enabled": True,
-    "saturation": 30.0,
-    "dead_zone": 2.3,
-}  # rad/s, chosen (problem files)
 
 
 @dataclass(frozen=True)
@@ -55,9 +51,9 @@ QUICK = Effort(Budget(evaluations=2_000, seconds=2.0), 3, 5)
 
 
 def problems() -> list[Problem]:
-    """The eight problem files, in the order of their names."""
-    files = sorted((PROBLEMS / "smdw").glob("*.toml"))
-    return [load_problem(path) for path in files if problem_kind(path) == "search"]
+    """The eight searches, in the order of their names, with drives that follow."""
+    ideal = {"actuator": None, "infeasible": None}
+    return [load_problem(PROBLEMS / "smdw" / f"{name}.toml", ideal) for name in sorted(DURATIONS)]
 
 
 def short(problem: Problem) -> str:
@@ -67,7 +63,7 @@ def short(problem: Problem) -> str:
 
 def without_limits(problem: Problem) -> TerminalObjective:
     """P2 free; P1 and P2 where no lattice point lies inside the space with P2 alone."""
-    objective = terminal_objective(with_free(problem.replace(actuator={"enabled": False}), "p2"))
+    objective = terminal_objective(with_free(problem, "p2"))
     part = objective.affine_part()
     points, _ = lattice_points(part, objective.bounds[part.variables])
     return (
@@ -77,7 +73,7 @@ def without_limits(problem: Problem) -> TerminalObjective:
 
 def with_limits(problem: Problem, *free: str) -> TerminalObjective:
     """Saturation and dead-zone switched on."""
-    return terminal_objective(with_free(problem.replace(actuator=HARD_LIMITS), *free))
+    return terminal_objective(with_free(through_drives(problem), *free))
 
 
 def all_optimizers(

@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 from trajopt.pipeline import solve, validate
-from trajopt.problem.search import load_problem
+from trajopt.problem import load_problem
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.style import in_style, save_figure
 from trajopt.sweeps.store import open_store

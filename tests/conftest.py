@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from smdw_problems import SMDW, smdw_problem
 
-from trajopt.problem.search import Problem
+from trajopt.problem import Problem
 
 
 @pytest.fixture(params=SMDW)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from trajopt.problem.search import Problem, load_problem, problem_kind
+from trajopt.problem import Problem, load_problem
+from trajopt.systems.smdw.thesis import DURATIONS
 
 ROOT = Path(__file__).parent.parent
-SMDW = sorted(
-    path.stem for path in (ROOT / "problems/smdw").glob("*.toml") if problem_kind(path) == "search"
-)
+SMDW = sorted(DURATIONS)
 
 
 def smdw_problem(name: str) -> Problem:
-    """A problem of thesis 000 by file name."""
-    return load_problem(ROOT / f"problems/smdw/{name}.toml")
+    """A problem of thesis 000 by file name, with drives that follow."""
+    changes = {"actuator": None, "infeasible": None}
+    return load_problem(ROOT / f"problems/smdw/{name}.toml", changes)

@@ -64,7 +64,7 @@ def test_a_solution_that_does_not_hold_exits_with_one():
         (("solve", SCENARIO, "--optimizer", "magic"), "one of pso"),
         (("solve", SCENARIO, "--seed", "-1"), "whole number"),
         (("solve", SCENARIO, "--seconds", "0"), "time > 0"),
-        (("solve", "problems/powerbot/experiment_1.toml"), "load_path_problem"),
+        (("solve", "problems/powerbot/experiment_1.toml"), "load_problem"),
         (("validate", "nowhere"), "nowhere"),
         (("explain", SCENARIO, "--set", "spline.duration=0"), "spline.duration"),
         (("explain", SCENARIO, "--engine", "toppra"), "--engine"),

@@ -25,7 +25,7 @@ def test_every_problem_holds(problem):
     assert solution.cost <= 1e-9
     assert min(solution.margins.values()) >= -1e-9
     assert np.abs(solution.deviation).max() < 1e-9
-    assert np.abs(solution.wheel_deviation[list(problem.goal.critical_indices)]).max() < 1e-6
+    assert np.abs(solution.wheel_deviation[list(problem.critical_indices)]).max() < 1e-6
 
 
 def test_time_scaling_keeps_wheel_angles(problem):
@@ -41,7 +41,7 @@ def test_time_scaling_keeps_wheel_angles(problem):
 
 
 def test_time_scaling_is_never_slower_than_linear(problem):
-    path, limits = solve(problem).path, problem.limits.as_limits()
+    path, limits = solve(problem).path, problem.limits
     robot = solve(problem).trajectory.robot
     linear = time_scale(path, limits, robot=robot, engine="linear")
     optimal = time_scale(
@@ -105,7 +105,7 @@ def test_feedback_in_the_check_brings_pose_and_critical_wheels_to_the_goal(scena
     report = validate(trajectory, scenario, engine="mujoco", control="pose and phase", seed=1)
     assert report.final_distance < 0.01
     assert abs(report.yaw) < np.radians(1.0)
-    assert np.abs(report.wheel_deviation[list(scenario.goal.critical_indices)]).max() < 0.1
+    assert np.abs(report.wheel_deviation[list(scenario.critical_indices)]).max() < 0.1
     other = validate(trajectory, scenario, engine="mujoco", control="pose and phase", seed=2)
     assert other.final_distance != report.final_distance
 
@@ -119,7 +119,7 @@ def test_the_check_starts_with_the_wheel_angles_that_the_plan_starts_with(scenar
     problem = scenario.replace({"start.wheels": start.tolist()})
     trajectory = solve(problem).trajectory
     report = validate(trajectory, problem, engine="mujoco", control=control)
-    angles, critical = report.recording.wheel_angles, list(problem.goal.critical_indices)
+    angles, critical = report.recording.wheel_angles, list(problem.critical_indices)
     np.testing.assert_allclose(angles[0], start, atol=0.02)
     missed = (angles[-1] - np.asarray(problem.goal.wheels))[critical] / (2 * np.pi)
     assert np.abs(missed - np.round(missed)).max() * 2 * np.pi < 0.1
@@ -160,7 +160,7 @@ def test_public_names_survive_importing_every_module():
         assert (
             trajopt.minimize(lambda x: x[0] ** 2, [[-1, 1]], budget=trajopt.Budget(100)).fun < 0.1
         )
-        limits, robot = problem.limits.as_limits(), solution.trajectory.robot
+        limits, robot = problem.limits, solution.trajectory.robot
         assert trajopt.time_scale(solution.path, limits, robot=robot).duration > 0
     for name in trajopt.__all__:
         assert getattr(trajopt, name) is not None

@@ -18,7 +18,7 @@ from trajopt.errors import (
     ProblemError,
     SimulationError,
 )
-from trajopt.problem.search import load_problem, problem_schema
+from trajopt.problem import load_problem, problem_schema
 
 
 @pytest.mark.parametrize("name", SMDW)

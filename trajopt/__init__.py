@@ -29,9 +29,8 @@ if TYPE_CHECKING:
     from trajopt.optimize.base import Budget, OptimizeResult, Status
     from trajopt.optimize.search import minimize
     from trajopt.paths.path import Path
-    from trajopt.pipeline import Solution, solve, time_path, validate
-    from trajopt.problem.given_path import load_path_problem
-    from trajopt.problem.search import Problem, load_problem
+    from trajopt.pipeline import Solution, solve, validate
+    from trajopt.problem import Problem, load_problem
     from trajopt.refine.jerk import limit_jerk
     from trajopt.refine.path import optimize_path
     from trajopt.refine.profile import follow
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
     from trajopt.sweeps.sweeps import sweep
     from trajopt.systems.smdw.planner import plan_climb
-    from trajopt.systems.smdw.problem import load_maneuver
     from trajopt.timing.scaling import time_scale
     from trajopt.timing.trajectory import State, Trajectory
     from trajopt.world.terrain import Flat
@@ -56,7 +54,7 @@ _HOME = {
     "MissingDependencyError": "trajopt.errors",
     "OptimizeResult": "trajopt.optimize.base",
     "Path": "trajopt.paths.path",
-    "Problem": "trajopt.problem.search",
+    "Problem": "trajopt.problem",
     "ProblemError": "trajopt.errors",
     "Robot": "trajopt.robots.robot",
     "SimulationError": "trajopt.errors",
@@ -75,9 +73,7 @@ _HOME = {
     "YawRate": "trajopt.limits.yaw_rate",
     "follow": "trajopt.refine.profile",
     "limit_jerk": "trajopt.refine.jerk",
-    "load_maneuver": "trajopt.systems.smdw.problem",
-    "load_path_problem": "trajopt.problem.given_path",
-    "load_problem": "trajopt.problem.search",
+    "load_problem": "trajopt.problem",
     "minimize": "trajopt.optimize.search",
     "optimize_path": "trajopt.refine.path",
     "plan_climb": "trajopt.systems.smdw.planner",
@@ -85,7 +81,6 @@ _HOME = {
     "robot_names": "trajopt.robots.robot",
     "solve": "trajopt.pipeline",
     "sweep": "trajopt.sweeps.sweeps",
-    "time_path": "trajopt.pipeline",
     "time_scale": "trajopt.timing.scaling",
     "validate": "trajopt.pipeline",
 }
@@ -118,8 +113,6 @@ __all__ = [
     "YawRate",
     "follow",
     "limit_jerk",
-    "load_maneuver",
-    "load_path_problem",
     "load_problem",
     "minimize",
     "optimize_path",
@@ -128,7 +121,6 @@ __all__ = [
     "robot_names",
     "solve",
     "sweep",
-    "time_path",
     "time_scale",
     "validate",
 ]

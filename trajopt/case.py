@@ -16,18 +16,11 @@ import numpy as np
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import Budget
 from trajopt.pipeline import Solution, solve, validate
-from trajopt.problem.search import Problem, problem_kind
+from trajopt.problem import Problem, load_problem
 from trajopt.simulate.check import ValidationReport
 from trajopt.sweeps.cases import Case
-from trajopt.sweeps.runfunction import function_named
 
 ENGINES = ("none", "pybullet", "mujoco")
-# kind of a problem file -> what reads it
-_READERS = {
-    "search": "trajopt.problem.search:load_problem",
-    "path": "trajopt.problem.given_path:load_path_problem",
-    "obstacle": "trajopt.systems.smdw.problem:load_maneuver",
-}
 
 
 @dataclass(frozen=True)
@@ -77,7 +70,7 @@ def run_case(case: Case, problem: Problem) -> dict[str, Any]:
         "evaluations": solution.evaluations,
         "holds": solution.holds,
         "faults": "; ".join(solution.faults),
-        "search": solution.search.status,
+        "search": "" if solution.search is None else solution.search.status,
         "margins": solution.margins,
         "pose_error": np.asarray(solution.deviation).tolist(),
         "wheel_error": np.asarray(solution.wheel_deviation).tolist(),
@@ -126,12 +119,12 @@ class ProblemRun:
     values put in whose names have a dot (``run.*`` are options of ``run_case``)."""
 
     func: Callable[[Case, Any], Any]
-    problem: Any
+    problem: Problem
 
     def __call__(self, case: Case) -> Any:
         return self.func(case, self.changed(case))
 
-    def changed(self, case: Case) -> Any:
+    def changed(self, case: Case) -> Problem:
         """The problem of a case. Raises ProblemError for values it cannot have."""
         return self.problem.replace(
             {k: v for k, v in case.values.items() if "." in k and not k.startswith("run.")}
@@ -140,7 +133,7 @@ class ProblemRun:
     @property
     def content(self) -> Any:
         """The problem in plain values, as identities of cases hold it."""
-        return self.problem.model_dump(mode="json", exclude_none=True)
+        return self.problem.standalone()
 
     def check(self, case: Case, spare: Collection[str]) -> None:
         """Find wrong names now and not in a million rows: ``case`` is the first one, ``spare`` are
@@ -156,14 +149,11 @@ class ProblemRun:
                     expected = f"a name without a dot: run.* is for {__name__}:run_case"
                     raise ArgumentError(name, case.values[name], expected)
             return
-        if not isinstance(self.problem, Problem):
-            expected = "run = 'module:function' beside this kind of problem"
-            raise ArgumentError("run", None, expected)
         CaseOptions.of(case.values)
         for name in spare:
             if name != "repeat":
                 expected = (
-                    "a dotted key of the problem, such as scene.friction, "
+                    "a dotted key of the problem, such as ground.friction, "
                     "repeat, or a name that derived or exclude use"
                 )
                 raise ArgumentError(f"axes.{name}", case.values[name], expected)
@@ -171,4 +161,4 @@ class ProblemRun:
 
 def with_problem(function: Callable[[Case, Any], Any], file: str | Path) -> ProblemRun:
     """``function(case, problem)`` bound to the problem in ``file``. Raises ProblemError."""
-    return ProblemRun(function, function_named("problem", _READERS[problem_kind(file)])(file))
+    return ProblemRun(function, load_problem(file))

@@ -1,10 +1,13 @@
-"""The whole on one page: problem -> control points -> path -> timing -> check in physics."""
+"""The whole on one page: problem -> path -> timing -> solution -> check in physics."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,66 +15,85 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array, fold
 from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.objectives.clearance import ClearObjective
 from trajopt.objectives.duration import DurationObjective
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
-from trajopt.problem.given_path import PathProblem
-from trajopt.problem.search import Problem
-from trajopt.robots.actuator import Actuator
+from trajopt.problem import Problem
+from trajopt.problem.extensions import SECTIONS, entry
+from trajopt.refine.profile import follow
 from trajopt.simulate.check import ValidationReport, drive_trajectory
 from trajopt.timing.nominal import nominal_timing
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
+from trajopt.world.crossing import Standing, crossings
 
+SearchObjective = TerminalObjective | DurationObjective | ClearObjective
 MARGIN = -1e-9  # least relative margin of a trajectory that keeps its limits
+
+
+class Details(Protocol):
+    """What the system of a section adds to a solution."""
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """What does not hold."""
+        ...
+
+    @property
+    def notes(self) -> dict[str, Any]:
+        """Facts for the summary, units in their names."""
+        ...
+
+    def save(self, folder: FilePath, *, pictures: bool) -> None:
+        """Write files of its own into a run folder."""
+        ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution:
-    """What ``solve`` found, everything recomputed from the control points.
+    """What ``solve`` found; everything said of it is recomputed from path and trajectory.
 
-    ``cost`` and ``terms`` are the objective's, without grid error. ``deviation`` is the final pose
-    error (x, y, yaw), ``wheel_deviation`` (W,) the final wheel angle minus the wanted one, folded
-    to the period; both are those of ``trajectory``. ``dead_zone_effect`` (W,) is what the drives'
-    dead-zone would take from each wheel while the trajectory starts and stops. ``trajectory`` is
-    None where no motion keeps the limits; ``infeasible`` then says which limit fails where.
+    ``trajectory`` is None where no motion keeps the limits (``infeasible`` says which fails where)
+    or there is no path (``refused`` says why). ``search`` is that of the control points, where they
+    were searched. ``alternatives`` are other solutions, best first; ``details`` is what the system
+    of a section of its own adds.
     """
 
     problem: Problem
-    objective: TerminalObjective | DurationObjective
-    search: OptimizeResult
-    terms: dict[str, float]
-    path: Path
+    path: Path | None
     trajectory: Trajectory | None
-    infeasible: InfeasibleError | None
-    deviation: Array
-    wheel_deviation: Array
-    dead_zone_effect: Array
-    wall_time: float
+    infeasible: InfeasibleError | None = None
+    search: OptimizeResult | None = None
+    refused: tuple[str, ...] = ()
+    alternatives: tuple[Solution, ...] = ()
+    details: Details | None = None
+    wall_time: float = field(default=0.0, compare=False)
 
     def __repr__(self) -> str:
         return (
-            f"Solution({self.problem.title!r}, cost={self.cost:.3g}, duration={self.duration:.4g} s, "
-            f"holds={self.holds}, optimizer={self.search.optimizer!r})"
+            f"Solution({self.problem.title!r}, cost={self.cost:.3g}, "
+            f"duration={self.duration:.4g} s, holds={self.holds})"
         )
+
+    @cached_property
+    def objective(self) -> SearchObjective:
+        """What was searched for. Raises ArgumentError where nothing was."""
+        return search_objective(self.problem)
+
+    @cached_property
+    def terms(self) -> dict[str, float]:
+        """Terms of the cost by name, without grid error."""
+        if self.search is None:
+            return {"duration": self.duration}
+        return self.objective.terms(self.search.x)
 
     @property
     def cost(self) -> float:
-        return self.search.fun
-
-    @property
-    def control_points(self) -> Array:
-        """(4, 3): x, y (m) and yaw (rad) of start, P1, P2, goal."""
-        heading = self.path.heading
-        assert heading is not None  # the objective's paths choose their heading
-        return np.column_stack([self.path.points, heading])
-
-    @property
-    def margins(self) -> dict[str, float]:
-        """Least relative margin of each limit on the fine grid; empty without a trajectory."""
-        return {} if self.trajectory is None else dict(self.trajectory.margins())
+        """Of the search; else the duration, s."""
+        return self.duration if self.search is None else self.search.fun
 
     @property
     def duration(self) -> float:
@@ -80,47 +102,116 @@ class Solution:
 
     @property
     def evaluations(self) -> int:
-        return self.search.nfev
+        return 0 if self.search is None else self.search.nfev
 
     @property
+    def control_points(self) -> Array:
+        """(K, 3): x, y (m) and yaw (rad) of the path's points; yaw NaN along the path."""
+        path = self.problem.flat_path if self.problem.job.name == "path" else self.path
+        if path is None:
+            return np.zeros((0, 3))
+        points, heading = path.points[:, :2], path.heading
+        yaw = np.full(len(points), np.nan) if heading is None else heading[: len(points)]
+        return np.column_stack([points, yaw])
+
+    @property
+    def margins(self) -> dict[str, float]:
+        """Least relative margin of each limit on the fine grid; empty without a trajectory."""
+        return {} if self.trajectory is None else dict(self.trajectory.margins())
+
+    @cached_property
+    def _final(self) -> tuple[Array, Array]:
+        """Pose (3,) and wheel angles (W,) at the end of the motion as it will be driven."""
+        if self.trajectory is not None and self.problem.actuator is None:
+            end = self.trajectory.at(self.trajectory.duration)
+            return end.pose[0], end.wheel_angles[0]
+        assert self.search is not None  # only asked for where a goal was searched
+        terminal = terminal_objective(self.problem)
+        final = terminal.predict_exactly(self.search.x)
+        pose = np.array([float(np.squeeze(v)) for v in (final.x, final.y, final.yaw)])
+        turned = np.array([float(np.squeeze(v)) for v in final.wheels])
+        return pose, self.problem.start_wheels + turned
+
+    @property
+    def deviation(self) -> Array:
+        """(3,): final x, y (m), yaw (rad) less the goal's; (0,) where nothing was searched."""
+        goal = self.problem.goal
+        if goal is None or self.search is None:
+            return np.zeros(0)
+        error = self._final[0] - np.array(goal.pose)
+        return np.array([*error[:2], fold(error[2])])
+
+    @property
+    def wheel_deviation(self) -> Array:
+        """(W,): final wheel angle less the wanted one, folded to the period, rad; (0,) where none
+        was wanted."""
+        goal = self.problem.goal
+        if goal is None or goal.wheels is None or self.search is None:
+            return np.zeros(0)
+        error = self._final[1] - np.array(goal.wheels)
+        return np.asarray(fold(error, self.problem.objective.period))
+
+    @cached_property
     def faults(self) -> tuple[str, ...]:
         """Why the solution does not hold, in words; empty when it holds."""
-        section, found = self.problem.objective, []
+        found = [*self.refused, *self._goal_faults()]
         if self.infeasible is not None:
             found.append(str(self.infeasible))
-        for name, error in zip(("x", "y", "yaw"), self.deviation, strict=True):
-            if not abs(error) <= section.pose_tolerance:
-                found.append(
-                    f"final {name} misses by {error:.3g} (tolerance {section.pose_tolerance:g})"
-                )
-        for name, i in zip(
-            self.problem.goal.critical, self.problem.goal.critical_indices, strict=True
-        ):
-            if not abs(self.wheel_deviation[i]) <= section.wheel_tolerance:
-                found.append(
-                    f"wheel {name} misses by {self.wheel_deviation[i]:.3g} rad "
-                    f"(tolerance {section.wheel_tolerance:g})"
-                )
         found += [
             f"limit {name} is broken by {-margin:.1%}"
             for name, margin in self.margins.items()
             if margin < MARGIN
         ]
+        found += self._crossing_faults()
+        found += () if self.details is None else self.details.faults
+        if self.problem.infeasible is not None and not found:
+            found.append(
+                f"it holds, but the problem says that none does: {self.problem.infeasible}"
+            )
         return tuple(found)
+
+    def _goal_faults(self) -> list[str]:
+        section, found = self.problem.objective, []
+        names = ("x", "y", "yaw")[: len(self.deviation)]
+        for name, error in zip(names, self.deviation, strict=True):
+            if not abs(error) <= section.pose_tolerance:
+                found.append(
+                    f"final {name} misses by {error:.3g} (tolerance {section.pose_tolerance:g})"
+                )
+        if len(self.wheel_deviation):
+            for name, i in zip(self.problem.critical, self.problem.critical_indices, strict=True):
+                if not abs(self.wheel_deviation[i]) <= section.wheel_tolerance:
+                    found.append(
+                        f"wheel {name} misses by {self.wheel_deviation[i]:.3g} rad "
+                        f"(tolerance {section.wheel_tolerance:g})"
+                    )
+        return found
+
+    def _crossing_faults(self) -> list[str]:
+        if self.path is None:
+            return []
+        spline, advice = self.problem.spline, ""
+        if spline is not None:
+            more = [name for name in ("p1", "p2", "heading") if name not in spline.free]
+            advice = "; more room to choose: spline.free with " + ", ".join(more) if more else ""
+        robot, scene = self.problem.robot, self.problem.scene
+        return [
+            f"{crossing}{advice}"
+            for crossing in crossings(self.path, robot.footprint, scene.obstacles)
+        ]
 
     @property
     def holds(self) -> bool:
-        """Whether pose and critical wheels are within tolerance and every limit is kept."""
+        """Whether the goal is met, every limit is kept and the outline keeps clear."""
         return not self.faults
 
     @property
     def status(self) -> str:
-        """One sentence: the search's status, and what does not hold."""
-        return (
-            self.search.message
-            if self.holds
-            else self.search.message + " | " + "; ".join(self.faults)
-        )
+        """One sentence: how it was found, and what does not hold."""
+        found = "timed" if self.search is None else self.search.message
+        known = self.problem.infeasible
+        expected = [f"as the problem says: {known}"] if known and self.faults else []
+        return " | ".join([found, *filter(None, ["; ".join(self.faults)]), *expected])
 
 
 def solve(
@@ -131,64 +222,105 @@ def solve(
     budget: Budget | None = None,
     x0: ArrayLike | None = None,
     progress: Callable[[int, float], None] | None = None,
+    engine: str = "auto",
 ) -> Solution:
-    """Search control points, then time the path.
+    """Do the job of a problem (``problem.job``): search control points and time the path, time a
+    given path, or what the system of a section does.
 
-    Without an actuator the path is time-scaled: as fast as the limits allow, final wheel angles
-    untouched. With one (the theses' way) it runs at uniform spline speed in the nominal duration,
-    as searched. ``progress(evaluations, best_cost)`` is called during the search. Raises
-    ArgumentError for bad arguments.
+    ``optimizer``, ``budget``, ``x0`` and ``progress(evaluations, best_cost)`` are of the search,
+    ``engine`` of time scaling. Without [actuator] a path is timed as fast as the limits allow, or
+    as its [profile] asks; with it, at uniform spline speed in the nominal duration, as searched.
+    Limits that no motion keeps are reported, not raised. Raises ArgumentError for bad arguments.
     """
     started = time.perf_counter()
     if not isinstance(problem, Problem):
         raise ArgumentError(
             "problem", type(problem).__name__, "a Problem (load_problem reads one from a file)"
         )
-    terminal = terminal_objective(problem)
-    objective = DurationObjective(terminal) if problem.objective.kind == "duration" else terminal
-    found = minimize(
-        objective,
-        terminal.bounds,
-        optimizer=optimizer,
-        x0=x0,
-        seed=seed,
-        budget=budget,
-        progress=progress,
-    )
-    path = objective.path(found.x)
-    trajectory, infeasible = _timed(terminal, path, found.x)
-    deviation, wheels = _final_deviation(terminal, found.x, trajectory)
-    return Solution(
-        problem,
-        objective,
-        found,
-        objective.terms(found.x),
-        path,
-        trajectory,
-        infeasible,
-        deviation,
-        wheels,
-        _dead_zone_effect(problem, trajectory),
-        time.perf_counter() - started,
-    )
-
-
-def time_path(problem: PathProblem, *, engine: str = "auto") -> Trajectory:
-    """The fastest motion along a given path, thesis 004's kind of problem.
-
-    Raises InfeasibleError, naming limit and place, where no motion keeps the limits.
-    """
-    if not isinstance(problem, PathProblem):
-        raise ArgumentError(
-            "problem", type(problem).__name__, "a PathProblem (load_path_problem reads one)"
+    job = problem.job.name
+    if job in SECTIONS:
+        if x0 is not None or engine != "auto":
+            raise ArgumentError("x0, engine", (x0, engine), f"None and auto for the job '{job}'")
+        found: Solution = entry(job).solve(
+            problem, optimizer=optimizer, seed=seed, budget=budget, progress=progress
         )
-    return time_scale(
-        problem.spline,
-        problem.as_limits(),
-        robot=problem.platform,
-        ground=problem.terrain,
-        engine=engine,
-    )
+    elif job == "path":
+        if optimizer != "auto" or budget is not None or x0 is not None:
+            raise ArgumentError(
+                "optimizer, budget, x0",
+                (optimizer, budget, x0),
+                "none: a given path is not searched",
+            )
+        found = _timed(problem, problem.path, engine)
+    else:
+        objective = search_objective(problem)
+        searched = minimize(
+            objective,
+            objective.bounds,
+            optimizer=optimizer,
+            x0=x0,
+            seed=seed,
+            budget=budget,
+            progress=progress,
+        )
+        found = _timed(problem, objective.path(searched.x), engine, searched)
+    return replace(with_details(found), wall_time=time.perf_counter() - started)
+
+
+def with_details(solution: Solution) -> Solution:
+    """With what the systems of its problem's sections add."""
+    modules = {SECTIONS[section]: section for section in solution.problem.given & set(SECTIONS)}
+    for section in modules.values():
+        if hasattr(entry(section), "details"):
+            solution = replace(solution, details=entry(section).details(solution))
+    return solution
+
+
+def search_objective(problem: Problem) -> SearchObjective:
+    """What the control points of a problem are searched for; with obstacles, clear of them."""
+    terminal = terminal_objective(problem)
+    duration = DurationObjective(terminal) if problem.objective.kind == "duration" else None
+    obstacles = problem.scene.obstacles
+    if not obstacles:
+        return terminal if duration is None else duration
+    ground = Standing(problem.robot.footprint, obstacles)
+    return ClearObjective(terminal, ground, duration=duration)
+
+
+def _timed(
+    problem: Problem, path: Path, engine: str, searched: OptimizeResult | None = None
+) -> Solution:
+    """The solution on a path; without a trajectory where no motion keeps the limits."""
+    limits, robot, ground = problem.limits, problem.robot, problem.scene.ground
+    wheels = problem.start_wheels
+    try:
+        if problem.actuator is not None and searched is not None:
+            if engine != "auto":
+                raise ArgumentError("engine", engine, "auto with [actuator]: nothing is scaled")
+            terminal = terminal_objective(problem)
+            duration = float(terminal.control_points(searched.x[:, None]).duration[0, 0])
+            timed = nominal_timing(
+                path, duration, limits, robot=robot, ground=ground, start_wheels=wheels
+            )
+        elif problem.profile is not None:
+            if engine != "auto":
+                raise ArgumentError("engine", engine, "auto with [profile]")
+            timed = follow(
+                path,
+                problem.profile.bound,
+                limits,
+                robot=robot,
+                ground=ground,
+                start_wheels=wheels,
+                manner=problem.profile.manner,
+            ).trajectory
+        else:
+            timed = time_scale(
+                path, limits, robot=robot, ground=ground, start_wheels=wheels, engine=engine
+            )
+    except InfeasibleError as error:
+        return Solution(problem, path, None, error, searched)
+    return Solution(problem, path, timed, None, searched)
 
 
 def validate(
@@ -217,47 +349,3 @@ def validate(
     return drive_trajectory(
         trajectory, problem, engine=engine, picture=picture, control=control, seed=seed
     )
-
-
-def _timed(
-    terminal: TerminalObjective, path: Path, x: Array
-) -> tuple[Trajectory | None, InfeasibleError | None]:
-    limits = terminal.problem.limits.as_limits()
-    try:
-        if terminal.actuator.is_ideal:
-            return time_scale(path, limits, robot=terminal.robot), None
-        duration = float(terminal.control_points(x[:, None]).duration[0, 0])
-        return nominal_timing(path, duration, limits, robot=terminal.robot), None
-    except InfeasibleError as error:
-        return None, error
-
-
-def _final_deviation(
-    terminal: TerminalObjective, x: Array, trajectory: Trajectory | None
-) -> tuple[Array, Array]:
-    """Final pose error (3,) and folded wheel deviations (W,), rad, of the motion as it will be
-    driven."""
-    problem = terminal.problem
-    if terminal.actuator.is_ideal and trajectory is not None:
-        end = trajectory.at(trajectory.duration)
-        pose, travel = end.pose[0], end.wheel_angles[0]
-    else:
-        final = terminal.predict_exactly(x)
-        pose = np.array([float(np.squeeze(v)) for v in (final.x, final.y, final.yaw)])
-        travel = np.array([float(np.squeeze(v)) for v in final.wheels])
-    wheels = np.asarray(problem.start.wheels) + travel - np.asarray(problem.goal.wheels)
-    turns = 2 * np.pi * np.round((pose[2] - problem.goal.pose[2]) / (2 * np.pi))
-    error = pose - np.array([*problem.goal.pose[:2], problem.goal.pose[2] + turns])
-    return error, np.asarray(fold(wheels, problem.objective.period))
-
-
-def _dead_zone_effect(problem: Problem, trajectory: Trajectory | None) -> Array:
-    """(W,): wheel angle that a dead-zone would take away over the trajectory, rad."""
-    if trajectory is None:
-        return np.full(4, np.nan)
-    drive = Actuator(dead_zone=problem.actuator.dead_zone)
-    # Equal steps of time; a wheel crosses the dead-zone a few times, each costs at most one step's
-    # error.
-    times = np.linspace(0.0, trajectory.duration, 20_001)
-    speeds = trajectory.at(times).wheel_speeds
-    return np.asarray(np.trapezoid(drive.output(speeds) - speeds, times, axis=0))

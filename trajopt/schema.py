@@ -44,6 +44,12 @@ def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
     )
 
 
+def as_problem_error(error: PydanticCustomError, file: str) -> ProblemError:
+    """A broken rule that was met outside of validation."""
+    rule = error.context or {}
+    return ProblemError(file, rule["key"], rule["given"], rule["expected"])
+
+
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Tables of a TOML file with ``overrides`` (dotted keys) applied. Raises ProblemError."""
     try:
@@ -137,6 +143,7 @@ def translated(error: ValidationError, file: str, model: type[BaseModel]) -> Pro
     if first["type"] == "trajopt_rule":
         context = first["ctx"]
         key = ".".join(part for part in (_joined(first["loc"]), context["key"]) if part)
+        key = key.replace(".[", "[")
         return ProblemError(file, key, context["given"], context["expected"])
     key = _joined(first["loc"])
     if first["type"] == "extra_forbidden":

@@ -22,7 +22,8 @@ from trajopt.objectives.terminal import TerminalObjective, terminal_objective, w
 from trajopt.optimize.base import Budget
 from trajopt.optimize.pso import ParticleSwarm
 from trajopt.optimize.search import minimize
-from trajopt.problem.search import Problem, load_problem
+from trajopt.problem import Problem, load_problem
+from trajopt.systems.smdw.thesis import through_drives
 
 PACKAGES = ("trajopt", "numpy", "numba", "pyswarms", "pymoo")
 PARTICLES, ITERATIONS = 50, 500  # thesis 000, Table 5.8
@@ -56,7 +57,7 @@ def objective(*free: str) -> TerminalObjective:
     """Scenario 1 lateral through saturation and dead-zone."""
     problem = load_problem(PROBLEMS / "smdw" / "scenario_1_lateral.toml")
     assert isinstance(problem, Problem)
-    return terminal_objective(with_free(problem.replace(actuator={"enabled": True}), *free))
+    return terminal_objective(with_free(through_drives(problem), *free))
 
 
 def kernels(repeats: int) -> tuple[list[tuple[str, ...]], list[float]]:

@@ -24,7 +24,7 @@ from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from trajopt.arrays import Array
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.search import minimize
-from trajopt.problem.search import load_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.climb import (
     CLIMB_SPEED,
     Climb,
@@ -38,11 +38,11 @@ from trajopt.systems.smdw.planner import (
     Configuration,
     Plan,
     approach_target,
-    configurations,
+    configurations_of,
     plan_configuration,
     travel_to_step,
 )
-from trajopt.systems.smdw.problem import ManeuverProblem, load_maneuver
+from trajopt.systems.smdw.thesis import through_drives
 from trajopt.systems.smdw.trials import (
     NEAREST,
     approach_command,
@@ -107,7 +107,7 @@ class Trial:
     seconds: float  # wall time, mean of its cell; nan where it was not taken
 
 
-def plan_of(problem: ManeuverProblem, configuration: Configuration) -> Plan:
+def plan_of(problem: Problem, configuration: Configuration) -> Plan:
     """The exact plan; these problems all have one."""
     plan = plan_configuration(problem, configuration)
     if not isinstance(plan, Plan):
@@ -116,7 +116,7 @@ def plan_of(problem: ManeuverProblem, configuration: Configuration) -> Plan:
 
 
 def climb_from(
-    problem: ManeuverProblem, plan: Plan, wheels: Array, rng: Generator, yaw_error: float = 0.0
+    problem: Problem, plan: Plan, wheels: Array, rng: Generator, yaw_error: float = 0.0
 ) -> Climb:
     """Sub-test 2 from the plan's target with random state errors and friction, and the given wheel
     angles (4,)."""
@@ -139,19 +139,15 @@ def climb_from(
 def pso_endings(height: float, name: str, searches: int) -> list[tuple[Array, float]]:
     """Final wheel angles (4,) and yaw error that the thesis's PSO plans, through its actuators,
     aiming at 0."""
-    problem = load_problem(
-        PROBLEMS / "smdw" / f"scenario_{SCENARIO[height]}_{name}.toml",
-        {"goal.wheels": [0.0, 0.0, 0.0, 0.0], "actuator.enabled": True},
-    )
+    file = PROBLEMS / "smdw" / f"scenario_{SCENARIO[height]}_{name}.toml"
+    problem = through_drives(load_problem(file), {"goal.wheels": [0.0, 0.0, 0.0, 0.0]})
     objective = terminal_objective(problem)
     found = []
     for seed in range(searches):
         x = minimize(objective, objective.bounds, optimizer="pso-thesis-enhanced", seed=seed).x
         end = objective.predict_exactly(x)
-        wheels = np.array([float(np.squeeze(v)) for v in end.wheels]) + np.array(
-            problem.start.wheels
-        )
-        found.append((wheels, float(np.squeeze(end.yaw)) - problem.goal.pose[2]))
+        wheels = np.array([float(np.squeeze(v)) for v in end.wheels]) + problem.start_wheels
+        found.append((wheels, float(np.squeeze(end.yaw)) - problem.search.goal[2]))
     return found
 
 
@@ -169,8 +165,8 @@ def planned(
     Cells in ``known`` (height, configuration, source) are left out.
     """
     for height, file in files.items():
-        problem = load_maneuver(PROBLEMS / "smdw" / file)
-        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+        problem = load_problem(PROBLEMS / "smdw" / file)
+        for configuration in configurations_of(problem):
             if configuration.name not in NAMES:
                 continue
             name, plan = NAMES[configuration.name], plan_of(problem, configuration)
@@ -205,8 +201,8 @@ def driven(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
     """Climb rates after the exact plan was driven open loop from a start with errors; a list a
     cell."""
     for height, file in FILES.items():
-        problem = load_maneuver(PROBLEMS / "smdw" / file)
-        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+        problem = load_problem(PROBLEMS / "smdw" / file)
+        for configuration in configurations_of(problem):
             if configuration.name not in NAMES:
                 continue
             plan = plan_of(problem, configuration)
@@ -239,8 +235,8 @@ def phases(engine: str, runs: int, workers: int) -> Iterator[list[Trial]]:
     """Climbs over the phase at which the leading wheels meet the step, for torques and frictions; a
     list a row."""
     for file in FILES.values():
-        problem = load_maneuver(PROBLEMS / "smdw" / file)
-        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+        problem = load_problem(PROBLEMS / "smdw" / file)
+        for configuration in configurations_of(problem):
             if NAMES.get(configuration.name) not in ("lateral", "forward35"):
                 continue
             for torque in TORQUES:
@@ -262,7 +258,7 @@ def phases(engine: str, runs: int, workers: int) -> Iterator[list[Trial]]:
 
 
 def _at_phase(
-    problem: ManeuverProblem,
+    problem: Problem,
     configuration: Configuration,
     phase: float,
     friction: float,
@@ -270,7 +266,7 @@ def _at_phase(
     number: int,
 ) -> Climb:
     target = approach_target(problem, configuration, phase=configuration.window.middle)
-    spin = np.sign(problem.platform.inverse @ np.array([*configuration.direction, 0.0]))
+    spin = np.sign(problem.robot.inverse @ np.array([*configuration.direction, 0.0]))
     wheels = np.array(target.wheels)
     critical = critical_wheels(configuration)
     for i in critical:
@@ -291,8 +287,8 @@ def causes(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
     """Climb rates over heading error, gap and approach speed, the others as planned; a list a
     cell."""
     for file in FILES.values():
-        problem = load_maneuver(PROBLEMS / "smdw" / file)
-        for configuration in configurations(problem.robot.wheel, problem.obstacle):
+        problem = load_problem(PROBLEMS / "smdw" / file)
+        for configuration in configurations_of(problem):
             name = NAMES.get(configuration.name)
             if name not in CAUSES_TORQUES:
                 continue
@@ -312,7 +308,7 @@ def causes(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
 
 
 def _caused(
-    problem: ManeuverProblem, configuration: Configuration, cause: str, value: float, number: int
+    problem: Problem, configuration: Configuration, cause: str, value: float, number: int
 ) -> Climb:
     if cause == "gap, cm":
         problem = problem.replace({"approach.gap": value / 100})

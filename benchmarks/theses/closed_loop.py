@@ -21,10 +21,11 @@ import numpy as np
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from trajopt.control.approach import Mode, Sensors, approach_controller
+from trajopt.problem import load_problem
 from trajopt.report.intervals import wilson
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
-from trajopt.systems.smdw.planner import Plan, configurations, plan_configuration
-from trajopt.systems.smdw.problem import load_maneuver
+from trajopt.systems.smdw.entry import free_ground
+from trajopt.systems.smdw.planner import Plan, configurations_of, plan_configuration
 from trajopt.systems.smdw.trials import four, step_scene
 
 FILES = ("step_5cm.toml", "step_3_5cm.toml")  # scenarios 1 and 2
@@ -77,23 +78,21 @@ def trial(
     """One approach under control: its ending, the plan's duration and how long it lasted, s."""
     rng = np.random.default_rng([number, 3])
     initial = rng.uniform(-math.pi, math.pi, 4)
-    problem = load_maneuver(PROBLEMS / "smdw" / file).replace({"start.wheels": initial.tolist()})
-    configuration = next(
-        c for c in configurations(problem.robot.wheel, problem.obstacle) if c.name == name
-    )
+    problem = load_problem(PROBLEMS / "smdw" / file).replace({"start.wheels": initial.tolist()})
+    configuration = next(c for c in configurations_of(problem) if c.name == name)
     plan = plan_configuration(problem, configuration)
     if not isinstance(plan, Plan):
         raise SystemExit(f"{file}, {name}, trial {number}: {plan.reason}")
     x, y, yaw = (float(v) for v in np.array(problem.start.pose) + rng.uniform(-1, 1, 3) * START)
     scene = step_scene(problem, float(rng.uniform(0.6, 1.0)))
-    critical = plan.problem.goal.critical_indices
+    critical = plan.problem.critical_indices
     controller = approach_controller(
         plan.trajectory,
-        problem.platform,
+        problem.robot,
         initial,
         critical,
         cap=problem.limits.wheel_speed or math.inf,
-        ground=problem.free_ground,
+        ground=free_ground(problem),
         sensors=sensors,
         mode=mode,
         rng=rng,

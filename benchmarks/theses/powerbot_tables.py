@@ -23,7 +23,7 @@ from trajopt.control.tracking import Tracker
 from trajopt.errors import TrajoptError
 from trajopt.limits.limit import Limit
 from trajopt.limits.slip import Slip
-from trajopt.problem.given_path import PathProblem, load_path_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.refine.jerk import limit_jerk
 from trajopt.refine.path import corridor, optimize_path
 from trajopt.refine.profile import follow
@@ -74,15 +74,15 @@ def table_rows() -> list[dict[str, str]]:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
-def problem(number: int) -> PathProblem:
+def problem(number: int) -> Problem:
     """The problem file of an experiment."""
-    return load_path_problem(PROBLEMS / "powerbot" / f"experiment_{number}.toml")
+    return load_problem(PROBLEMS / "powerbot" / f"experiment_{number}.toml")
 
 
-def timed(task: PathProblem, variant: str, engine: str = "auto") -> Trajectory:
+def timed(task: Problem, variant: str, engine: str = "auto") -> Trajectory:
     """The path of a problem, timed."""
     limits = task.as_limits(variant="thesis" if variant == "thesis" else "physical")
-    return time_scale(task.spline, limits, robot=task.platform, ground=task.terrain, engine=engine)
+    return time_scale(task.path, limits, robot=task.robot, ground=task.scene.ground, engine=engine)
 
 
 def printed_linear() -> ResultTable:
@@ -170,7 +170,7 @@ def minimum_times() -> ResultTable:
         rows.append(
             [
                 row["experiment"],
-                f"{task.spline.length:.2f}",
+                f"{task.path.length:.2f}",
                 row["distance"],
                 row["time"],
                 f"{linear.duration:.2f}",
@@ -216,9 +216,9 @@ def refinements(numbers: Sequence[int]) -> ResultTable:
         found = optimize_path(
             lambda z, level=level, ramps=ramps: lay_over(level(z), ramps) if ramps else level(z),
             np.tile([-CORRIDOR, CORRIDOR], (count, 1)),
-            task.as_limits(variant="physical"),
-            robot=task.platform,
-            ground=task.terrain,
+            task.replace({"limits.variant": None}).limits,
+            robot=task.robot,
+            ground=task.scene.ground,
             steps=6,
         )
         rows.append([*cells, f"{found.trajectory.duration:.2f}", f"{found.gain:.1%}"])
@@ -283,7 +283,7 @@ def encounter_three() -> ResultTable:
     plans = {"linear": timed(task, "thesis", "linear"), "optimal": timed(task, "physical")}
     visitors = visits(task)["stand in the way, then are gone"][1]
     for name, plan in plans.items():
-        where = course(plan, task.platform)
+        where = course(plan, task.robot)
         sensor = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME)
         free = run_encounter(where, sensor, lambda *_: [], longest=200.0)
         for rule, planner in (("stops in time", replan), ("halving (thesis)", halving_plan)):
@@ -328,14 +328,14 @@ def encounter_three() -> ResultTable:
     )
 
 
-def visits(task: PathProblem) -> dict[str, tuple[Sensor, list[Visitor]]]:
+def visits(task: Problem) -> dict[str, tuple[Sensor, list[Visitor]]]:
     """Experiment 3's obstacles, as it prints them and on tracks; the sensor knows how fast they may
     be."""
     times = [(thing.appears, thing.clears_after, thing.distance) for thing in task.obstacles]
     sonar = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME)
     slow = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME, unseen_speed=SLOW)
     edge = (
-        -float(np.asarray(task.platform.footprint)[:, 1].min()) + DISC
+        -float(np.asarray(task.robot.footprint)[:, 1].min()) + DISC
     )  # m, centre of a disc that leaves the lane
     return {
         "stand in the way, then are gone": (
@@ -363,7 +363,7 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
 
     FIGURES.mkdir(parents=True, exist_ok=True)
     task, robot = problem(3), BALANCED
-    plan = time_scale(task.spline, with_friction(task, BENDS), robot=robot)
+    plan = time_scale(task.path, with_friction(task, BENDS), robot=robot)
     where = course(plan, robot, limits=with_friction(task, BRAKES))
     rows, pictures = [], []
     for name, (sensor, visitors) in visits(task).items():
@@ -423,10 +423,10 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
     ), pictures
 
 
-def with_friction(task: PathProblem, share: float) -> list[Limit]:
+def with_friction(task: Problem, share: float) -> list[Limit]:
     """The problem's limits with the physical slip limit per wheel, at a share of the friction."""
     kept: list[Limit] = [
-        x for x in task.as_limits(variant="physical") if x.name not in ("slip", "tip")
+        x for x in task.replace({"limits.variant": None}).limits if x.name not in ("slip", "tip")
     ]
     return [*kept, Slip(share * FRICTION, per_wheel=True)]
 
@@ -458,10 +458,10 @@ def following() -> ResultTable:
     rows = []
     for manner in ("below", "least_squares"):
         found = follow(
-            task.spline,
+            task.path,
             profile,
-            task.as_limits(),
-            robot=task.platform,
+            task.limits,
+            robot=task.robot,
             manner="below" if manner == "below" else "least_squares",
         )
         rows.append(
@@ -491,7 +491,7 @@ def following_in_physics() -> ResultTable:
     rows = []
     for manner in ("below", "least_squares"):
         plan = follow(
-            task.spline,
+            task.path,
             profile,
             with_friction(task, RESERVE),
             robot=robot,
@@ -546,7 +546,7 @@ def physics(numbers: Sequence[int]) -> ResultTable:
     for number in numbers:
         task = problem(number)
         plan = time_scale(
-            task.spline, with_friction(task, RESERVE), robot=robot, ground=task.terrain
+            task.path, with_friction(task, RESERVE), robot=robot, ground=task.scene.ground
         )
         floor = Floor(task.friction, tuple(r.ramp for r in task.ramps))
         theirs = [m for m in measured if int(m["experiment"]) == number]

@@ -10,7 +10,8 @@ import numpy as np
 
 from benchmarks.common import PROBLEMS, ResultTable, publish
 from trajopt.pipeline import solve, validate
-from trajopt.problem.search import load_problem, problem_kind
+from trajopt.problem import load_problem
+from trajopt.systems.smdw.thesis import DURATIONS
 
 HEADER = (
     "engine",
@@ -26,10 +27,10 @@ HEADER = (
 def main() -> None:
     """Print the table and write it."""
     rows = []
-    for file in sorted((PROBLEMS / "smdw").glob("*.toml")):
-        if problem_kind(file) != "search":
-            continue
-        problem = load_problem(file, {"spline.free": ["p1", "p2"]})
+    changes = {"actuator": None, "infeasible": None, "spline.free": ["p1", "p2"]}
+    for name in sorted(DURATIONS):
+        file = PROBLEMS / "smdw" / f"{name}.toml"
+        problem = load_problem(file, changes)
         trajectory = solve(problem).trajectory
         assert trajectory is not None
         for engine in ("pybullet", "mujoco"):

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 from benchmarks.common import OUT, PROBLEMS
 from benchmarks.theses import closed_loop, smdw_printed
 from benchmarks.theses.climb import NAMES, climb_from, plan_of
+from trajopt.problem import load_problem
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.systems.smdw.climb import Climb, judge, reached, record_climb, run_approach
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, loc8_smdw
@@ -27,8 +28,7 @@ from trajopt.systems.smdw.pictures import (
     setups_figure,
     wheel_at_step_figure,
 )
-from trajopt.systems.smdw.planner import Plan, configurations
-from trajopt.systems.smdw.problem import load_maneuver
+from trajopt.systems.smdw.planner import Plan, configurations_of
 from trajopt.systems.smdw.trial_pictures import (
     ClimbCell,
     Motions,
@@ -79,9 +79,9 @@ class Driven:
 def driven(number: int, trials: int) -> dict[str, Driven]:
     """Open-loop approaches of a scenario from starts with errors, friction 0.6-1.0, in MuJoCo, by
     configuration."""
-    problem = load_maneuver(PROBLEMS / "smdw" / SCENARIOS[number])
+    problem = load_problem(PROBLEMS / "smdw" / SCENARIOS[number])
     found = {}
-    for configuration in configurations(problem.robot.wheel, problem.obstacle):
+    for configuration in configurations_of(problem):
         if configuration.name not in NAMES:
             continue
         plan = plan_of(problem, configuration)
@@ -302,7 +302,7 @@ def wheel_and_set_ups() -> Iterator[tuple[str, Figure]]:
         "set_ups.png",
         setups_figure(
             [
-                (f"{numbers[n]}: scenario {n}", load_maneuver(PROBLEMS / "smdw" / file), TARGETS[n])
+                (f"{numbers[n]}: scenario {n}", load_problem(PROBLEMS / "smdw" / file), TARGETS[n])
                 for n, file in SCENARIOS.items()
             ]
         ),

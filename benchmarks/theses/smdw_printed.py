@@ -20,12 +20,13 @@ import numpy as np
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
 from benchmarks.theses.climb import NAMES, THESIS
+from trajopt.problem import Problem, load_problem
 from trajopt.report.intervals import wilson
 from trajopt.robots.robot import robot
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.systems.smdw.climb import Climb, Outcome, judge, record_climb
-from trajopt.systems.smdw.planner import Configuration, configurations
-from trajopt.systems.smdw.problem import ManeuverProblem, load_maneuver
+from trajopt.systems.smdw.entry import step_of
+from trajopt.systems.smdw.planner import Configuration, configurations_of
 from trajopt.systems.smdw.trials import critical_wheels, four, step_scene
 
 DATA = Path(__file__).parent / "data" / "smdw"
@@ -76,8 +77,8 @@ class Group:
 def groups() -> Iterator[Group]:
     """Scenario 1 at both heights, and lateral at 3.5 cm with the yaw set right (Figures 6.6, 6.7,
     6.8)."""
-    problem = load_maneuver(PROBLEMS / "smdw" / "step_5cm.toml")
-    for configuration in configurations(problem.robot.wheel, problem.obstacle):
+    problem = load_problem(PROBLEMS / "smdw" / "step_5cm.toml")
+    for configuration in configurations_of(problem):
         if configuration.name not in TABLES:
             continue
         name = NAMES[configuration.name]
@@ -106,18 +107,18 @@ def moved_up(climb: Climb) -> Climb:
 
 
 def printed_climb(
-    problem: ManeuverProblem, configuration: Configuration, row: dict[str, str], height: float
+    problem: Problem, configuration: Configuration, row: dict[str, str], height: float
 ) -> Climb:
     """Sub-test 2 from a printed state. Wheel angles keep their phase along the rotation, whatever
     its sign."""
-    spin = np.sign(problem.platform.inverse @ np.array([*configuration.direction, 0.0]))
+    spin = np.sign(problem.robot.inverse @ np.array([*configuration.direction, 0.0]))
     wheels = (
         np.array([float(row[f"theta{i}_rad"]) for i in (1, 2, 3, 4)])
         * PRINTED_SPIN[configuration.name]
         * spin
     )
     pose = (float(row["xf_m"]), float(row["yf_m"]), float(row["psif_rad"]))
-    room = problem.obstacle.place[0] - pose[0]
+    room = step_of(problem).place[0] - pose[0]
     return Climb(
         replace(step_scene(problem, problem.ground.friction), height=height),
         pose,

@@ -19,7 +19,7 @@ from trajopt.objectives.terminal import TerminalObjective, terminal_objective
 from trajopt.optimize.base import Budget, OptimizeResult
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path as RobotPath
-from trajopt.problem.search import Problem, load_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.search_pictures import (
     CostMap,
     SwarmSearch,
@@ -28,13 +28,10 @@ from trajopt.systems.smdw.search_pictures import (
     searches_figure,
     swarms_figure,
 )
+from trajopt.systems.smdw.thesis import through_drives
 
 # rad/s, fitted to Table 5.5 (loosely): what the thesis's drives seem to have done
-ACTUATOR: dict[str, float | bool] = {
-    "actuator.enabled": True,
-    "actuator.saturation": 43.0,
-    "actuator.dead_zone": 2.8,
-}
+ACTUATOR = {"saturation": 43.0, "dead_zone": 2.8}
 GAINS, BETA = np.array([3.0, 0.125, 2.5]), 12.5  # Table 5.8
 FIRST_GAINS, FIRST_BETA = np.array([1.0, 0.125, 1.0]), 10.0  # Table 5.2: all four wheels count
 PSO = "pso-thesis-enhanced"
@@ -53,7 +50,7 @@ VIEW = (
 def table_5_3(duration: float, *free: str) -> Problem:
     """The test problem of Table 5.3 through the thesis's actuators; ``free`` control values,
     default P2."""
-    changes = {"spline.duration": duration, **ACTUATOR}
+    changes = {"actuator": {"duration": duration, **ACTUATOR}}
     problem = load_problem(PROBLEMS / "smdw" / "table_5_3.toml", changes)
     return problem.replace({"spline.free": list(free)}) if free else problem
 
@@ -215,9 +212,8 @@ def scenario_searches(quick: bool) -> Iterator[tuple[str, Figure]]:
     panels, maps = [], []
     for number in (1, 2):
         for name in CONFIGURATIONS:
-            problem = load_problem(
-                PROBLEMS / "smdw" / f"scenario_{number}_{name}.toml", {"actuator.enabled": True}
-            )
+            file = PROBLEMS / "smdw" / f"scenario_{number}_{name}.toml"
+            problem = through_drives(load_problem(file))
             objective = terminal_objective(problem)
             found = [
                 minimize(objective, objective.bounds, optimizer=PSO, seed=seed)

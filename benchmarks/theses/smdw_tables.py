@@ -45,14 +45,15 @@ from benchmarks.theses.smdw_searches import (
 from trajopt.arrays import fold
 from trajopt.objectives.terminal import terminal_cost, terminal_objective
 from trajopt.optimize.search import minimize
-from trajopt.problem.search import WHEELS, Problem, load_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.report.style import in_style, save_figure
 from trajopt.simulate.engine import ENGINES
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
+from trajopt.systems.smdw.entry import WHEELS
 from trajopt.systems.smdw.geometry import CLOUD_POINTS, contact_offset, meet_step, meet_step_cloud
 from trajopt.systems.smdw.pictures import plans_figure
 from trajopt.systems.smdw.planner import plan_climb
-from trajopt.systems.smdw.problem import load_maneuver
+from trajopt.systems.smdw.thesis import through_drives
 
 FIRST_GOAL = (2.0, 0.75, math.pi / 2)  # m, m, rad: Table 5.3
 EXACT = 1e-6  # cost up to which a search counts as exact
@@ -249,7 +250,7 @@ def scenarios() -> tuple[ResultTable, list[tuple[str, Figure]]]:
     rows: list[tuple[str, ...]] = []
     pictures = []
     for number in (1, 2):
-        problem = load_maneuver(
+        problem = load_problem(
             PROBLEMS / "smdw" / ("step_5cm.toml" if number == 1 else "step_3_5cm.toml")
         )
         maneuver = plan_climb(problem)
@@ -260,7 +261,7 @@ def scenarios() -> tuple[ResultTable, list[tuple[str, Figure]]]:
                 (
                     str(number),
                     name,
-                    f"{_cost(load_problem(file, {'actuator.enabled': True})):.3g}",
+                    f"{_cost(through_drives(load_problem(file))):.3g}",
                     f"{worst:.0e}",
                     f"{maneuver.wall_time:.2f}",
                 )

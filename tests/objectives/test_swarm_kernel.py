@@ -3,37 +3,33 @@ travel."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from smdw_problems import SMDW, smdw_problem
 
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective, with_free
-from trajopt.problem.search import Problem, load_problem
+from trajopt.systems.smdw.thesis import through_drives
 
 pytest.importorskip("numba")
 
-FILES = sorted((Path(__file__).parents[2] / "problems" / "smdw").glob("scenario_*.toml")) + sorted(
-    (Path(__file__).parents[2] / "problems" / "smdw").glob("table_*.toml")
-)
 SPACES = [("p1",), ("p2",), ("p1", "p2"), ("p1", "p2", "duration"), ("p1", "p2", "heading")]
 
 
-def objective(file: Path, *free: str, enabled: bool = True, **actuator: float) -> TerminalObjective:
-    problem = load_problem(file)
-    assert isinstance(problem, Problem)
-    return terminal_objective(
-        with_free(problem.replace(actuator={"enabled": enabled, **actuator}), *free)
-    )
+def objective(name: str, *free: str, ideal: bool = False, **drives: float) -> TerminalObjective:
+    problem = smdw_problem(name)
+    if not ideal:
+        changes = {f"actuator.{key}": value for key, value in drives.items()}
+        problem = through_drives(problem).replace(changes)
+    return terminal_objective(with_free(problem, *free))
 
 
 @pytest.mark.parametrize("free", SPACES)
-@pytest.mark.parametrize("file", FILES, ids=lambda f: f.stem)
+@pytest.mark.parametrize("name", SMDW)
 @pytest.mark.parametrize("count", [1, 50])
 def test_final_states_and_costs_agree_with_the_readable_form(
-    file: Path, free: tuple[str, ...], count: int
+    name: str, free: tuple[str, ...], count: int
 ) -> None:
-    asked = objective(file, *free)
+    asked = objective(name, *free)
     z = np.random.default_rng(count).uniform(*asked.bounds.T, size=(count, asked.dimension))
     end = asked.predict_readable(z.T)
     wanted = np.vstack([end.x, end.y, end.yaw, *end.wheels])
@@ -48,15 +44,15 @@ def test_final_states_and_costs_agree_with_the_readable_form(
 
 
 @pytest.mark.parametrize(
-    "actuator",
+    "drives",
     [
         {"saturation": 1e6, "dead_zone": 0.0},
         {"saturation": 30.0, "dead_zone": 0.0},
         {"saturation": 5.0, "dead_zone": 4.9},
     ],
 )
-def test_extreme_actuators_agree(actuator: dict[str, float]) -> None:
-    asked = objective(FILES[0], "p2", **actuator)
+def test_extreme_actuators_agree(drives: dict[str, float]) -> None:
+    asked = objective(SMDW[0], "p2", **drives)
     z = np.random.default_rng(1).uniform(*asked.bounds.T, size=(7, 2))
     readable = asked.evaluate_readable(z).cost
     assert np.max(np.abs(asked.evaluate(z).cost - readable)) <= 1e-11 * max(
@@ -65,7 +61,7 @@ def test_extreme_actuators_agree(actuator: dict[str, float]) -> None:
 
 
 def test_affine_costs_agree_with_the_prediction() -> None:
-    for file in FILES:
-        asked = objective(file, "p1", "p2", enabled=False)
+    for name in SMDW:
+        asked = objective(name, "p1", "p2", ideal=True)
         z = np.random.default_rng(2).uniform(*asked.bounds.T, size=(20, 4))
         assert np.max(np.abs(asked.evaluate(z).cost - asked.evaluate_readable(z).cost)) <= 1e-10

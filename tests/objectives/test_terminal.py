@@ -24,6 +24,7 @@ from trajopt.objectives.terminal import (
 )
 from trajopt.optimize.lattice import lattice_points
 from trajopt.robots.robot import robot as shipped
+from trajopt.systems.smdw.thesis import through_drives
 
 DATA = ROOT / "tests/data/smdw"
 PRINT_ROUNDING = 0.0015
@@ -62,7 +63,7 @@ def test_folding_is_the_circular_distance(angle, period):
 
 
 def with_actuator(problem, *free):
-    return with_free(problem.replace(actuator={"enabled": True}), *(free or ("p2",)))
+    return with_free(through_drives(problem), *(free or ("p2",)))
 
 
 @pytest.mark.parametrize("steps", [48, 252, 2001])
@@ -83,7 +84,7 @@ def test_exact_prediction_against_an_ode_solver():
     objective = terminal_objective(problem)
     x = objective.default
     points = objective.control_points(x[:, None])
-    basis, speed = objective.basis, 3 / problem.spline.duration
+    basis, speed = objective.basis, 3 / problem.actuator.duration
 
     def rates(t, state):
         u = np.array([1 + speed * t])
@@ -100,9 +101,9 @@ def test_exact_prediction_against_an_ode_solver():
         c, s = np.cos(state[2]), np.sin(state[2])
         return [c * vx - s * vy, s * vx + c * vy, wz, *wheels]
 
-    start = [*problem.start.pose, 0, 0, 0, 0]
+    start = [*problem.search.start, 0, 0, 0, 0]
     end = solve_ivp(
-        rates, (0, problem.spline.duration), start, rtol=1e-8, atol=1e-9, max_step=2e-3
+        rates, (0, problem.actuator.duration), start, rtol=1e-8, atol=1e-9, max_step=2e-3
     ).y[:, -1]
     final = objective.predict_exactly(x)
     got = np.ravel([final.x, final.y, final.yaw, *final.wheels])
@@ -166,7 +167,7 @@ def test_wheel_identities_hold_along_every_path(problem):
     x = np.random.default_rng(5).uniform(*objective.bounds.T)
     t1, t2, t3, t4 = np.ravel(objective.predict_exactly(x).wheels)
     assert t1 + t2 == pytest.approx(t3 + t4, abs=1e-9)
-    turn = problem.goal.pose[2] - problem.start.pose[2]
+    turn = problem.search.goal[2] - problem.search.start[2]
     assert -t1 + t2 - t3 + t4 == pytest.approx(4 * 0.692 / 0.098 * turn, abs=1e-9)
 
 
@@ -177,11 +178,6 @@ def test_affine_matrix_is_well_conditioned_and_right(problem):
     x = np.random.default_rng(2).uniform(*objective.bounds.T)
     errors = np.ravel(objective.wheel_errors(objective.predict_exactly(x)))
     np.testing.assert_allclose(matrix @ x + offset, errors, atol=1e-10)
-
-
-def test_matrix_does_not_depend_on_duration(scenario):
-    slow = terminal_objective(scenario.replace(spline={"duration": 35.0}))
-    np.testing.assert_array_equal(slow.affine()[0], terminal_objective(scenario).affine()[0])
 
 
 def test_lattice_is_exact_in_the_theses_convention_too(problem):

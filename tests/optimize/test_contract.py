@@ -13,6 +13,7 @@ from trajopt.objectives.base import Capability
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.base import Budget, Status, best_index, better
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
+from trajopt.systems.smdw.thesis import through_drives
 
 GENERAL = [
     name for name in optimizer_names() if Capability.RESIDUALS not in optimizer_named(name).needs
@@ -95,7 +96,7 @@ def test_target_ends_the_search(name):
 
 @pytest.mark.parametrize("name", optimizer_names())
 def test_same_seed_same_bits(name):
-    problem = smdw_problem("scenario_2_lateral").replace(actuator={"enabled": True})
+    problem = through_drives(smdw_problem("scenario_2_lateral"))
     objective = terminal_objective(problem)
     a, b = (
         minimize(

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from smdw_problems import smdw_problem
 
 import trajopt
 from trajopt.pipeline import Solution
-from trajopt.problem.search import Problem
+from trajopt.problem import Problem
 from trajopt.simulate.check import ValidationReport
 from trajopt.simulate.engine import Recording
-
-PROBLEMS = Path(__file__).parents[2] / "problems" / "smdw"
+from trajopt.systems.smdw.thesis import through_drives
 
 
 def problem_file(name: str) -> Problem:
-    found = trajopt.load_problem(PROBLEMS / f"{name}.toml")
-    assert isinstance(found, Problem)
-    return found
+    return smdw_problem(name)
 
 
 @pytest.fixture(scope="session")
@@ -32,8 +28,8 @@ def exact() -> Solution:
 def through_actuators() -> Solution:
     """A short swarm search through the actuators: nominal timing, limits broken, misses the
     goal."""
-    problem = problem_file("scenario_2_forward45").replace(
-        {"actuator.enabled": True, "spline.free": ["p1", "p2", "heading"]}
+    problem = through_drives(
+        problem_file("scenario_2_forward45"), {"spline.free": ["p1", "p2", "heading"]}
     )
     return trajopt.solve(problem, optimizer="pso", seed=3, budget=trajopt.Budget(evaluations=500))
 
@@ -52,7 +48,7 @@ def without_motion(exact: Solution) -> Solution:
     from dataclasses import replace
 
     error = trajopt.InfeasibleError("tip", 0.25, "rest already breaks it")
-    return replace(exact, trajectory=None, infeasible=error, dead_zone_effect=np.full(4, np.nan))
+    return replace(exact, trajectory=None, infeasible=error)
 
 
 @pytest.fixture(scope="session")

@@ -20,7 +20,6 @@ from tests.report.conftest import problem_file
 from trajopt.errors import ArgumentError, MissingDependencyError, ProblemError
 from trajopt.optimize.search import optimizer_names
 from trajopt.pipeline import Solution
-from trajopt.problem.search import WHEELS
 from trajopt.provenance import commit, versions
 from trajopt.report.files import as_toml, finite
 from trajopt.report.run_folder import (
@@ -33,6 +32,7 @@ from trajopt.report.run_folder import (
     write_validation,
 )
 from trajopt.simulate.check import ValidationReport
+from trajopt.systems.smdw.entry import WHEELS
 
 ALL = ("exact", "through_actuators", "violated", "without_motion")
 

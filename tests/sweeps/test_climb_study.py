@@ -10,7 +10,7 @@ from trajopt.sweeps.cases import Case
 from trajopt.sweeps.sweepfile import load_sweep
 from trajopt.systems.smdw import study as climb_study
 from trajopt.systems.smdw.climb import Climb, Outcome, run_climb
-from trajopt.systems.smdw.planner import configurations
+from trajopt.systems.smdw.planner import configurations, wheel_of
 
 
 def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -41,6 +41,6 @@ def test_all_configurations_of_the_study_are_there_and_others_are_named() -> Non
     wanted = {row["configuration"] for row in plan.table.rows()}
     for height in {row["obstacle.height"] for row in plan.table.rows()}:
         step = problem.replace({"obstacle.height": height}).obstacle
-        assert wanted <= {c.name for c in configurations(problem.robot.wheel, step)}
+        assert wanted <= {c.name for c in configurations(wheel_of(problem), step)}
     with pytest.raises(ArgumentError, match="lateral left"):
         climb_study.trial(Case("0" * 32, {"configuration": "on its head"}), problem)

@@ -16,9 +16,15 @@ from tests.sweeps.crashes import ROOT
 from trajopt.cli import app
 from trajopt.control.approach import Sensors
 from trajopt.errors import ArgumentError
+from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.approach_run import Ending
-from trajopt.systems.smdw.planner import Plan, configurations, plan_configuration, travel_to_step
-from trajopt.systems.smdw.problem import ManeuverProblem, load_maneuver
+from trajopt.systems.smdw.entry import step_of
+from trajopt.systems.smdw.planner import (
+    Plan,
+    configurations_of,
+    plan_configuration,
+    travel_to_step,
+)
 from trajopt.systems.smdw.trials import (
     NEAREST,
     Scatter,
@@ -32,24 +38,20 @@ FILE = ROOT / "problems" / "smdw" / "step_3_5cm.toml"
 
 
 @pytest.fixture(scope="module")
-def problem() -> ManeuverProblem:
-    return load_maneuver(FILE)
+def problem() -> Problem:
+    return load_problem(FILE)
 
 
 @pytest.fixture(scope="module")
-def plan(problem: ManeuverProblem) -> Plan:
-    found = next(
-        c
-        for c in configurations(problem.robot.wheel, problem.obstacle)
-        if c.name == "forward -35 deg"
-    )
+def plan(problem: Problem) -> Plan:
+    found = next(c for c in configurations_of(problem) if c.name == "forward -35 deg")
     made = plan_configuration(problem, found)
     assert isinstance(made, Plan)
     return made
 
 
 def test_feedback_ends_nearer_than_planned_speeds_and_numbers_repeat(
-    problem: ManeuverProblem, plan: Plan
+    problem: Problem, plan: Plan
 ) -> None:
     loose = climb_trials(problem, plan, (3,))[0]
     seen: list[int] = []  # how many are done
@@ -74,7 +76,7 @@ def test_feedback_ends_nearer_than_planned_speeds_and_numbers_repeat(
         assert np.array_equal(first.approach.pose, second.approach.pose)
 
 
-def test_starts_scatter_as_stated(problem: ManeuverProblem, plan: Plan) -> None:
+def test_starts_scatter_as_stated(problem: Problem, plan: Plan) -> None:
     rng = np.random.default_rng(5)
     commands = [approach_command(problem, plan, rng) for _ in range(60)]
     poses = np.array([c.start_pose for c in commands]) - problem.start.pose
@@ -88,9 +90,9 @@ def test_starts_scatter_as_stated(problem: ManeuverProblem, plan: Plan) -> None:
 
 @pytest.mark.parametrize("direction", [0.0, 0.7, -2.0])
 def test_a_climb_starts_before_the_step_whatever_its_direction(
-    problem: ManeuverProblem, direction: float
+    problem: Problem, direction: float
 ) -> None:
-    obstacle = problem.obstacle.model_copy(update={"direction": direction})
+    obstacle = step_of(problem).model_copy(update={"direction": direction})
     turned = problem.model_copy(update={"obstacle": obstacle})
     normal, place = np.array(obstacle.normal), np.array(obstacle.place)
     for yaw in (0.0, 1.1):
@@ -108,7 +110,7 @@ def test_a_climb_starts_before_the_step_whatever_its_direction(
 
 
 def test_travel_to_the_step_is_the_target_s_there_and_shrinks_on_the_way(
-    problem: ManeuverProblem, plan: Plan
+    problem: Problem, plan: Plan
 ) -> None:
     there = travel_to_step(problem, plan.configuration, plan.target.pose)
     assert there == pytest.approx(plan.target.travel, abs=1e-12)
@@ -125,9 +127,7 @@ def test_an_exploded_run_is_within_no_bounds() -> None:
     assert not Ending(0.0, 0.1, 0.0, exploded=False).within(1.0, 0.05, 1.0)
 
 
-def test_errors_of_worker_processes_arrive_as_they_are(
-    problem: ManeuverProblem, plan: Plan
-) -> None:
+def test_errors_of_worker_processes_arrive_as_they_are(problem: Problem, plan: Plan) -> None:
     with pytest.raises(ArgumentError, match="pybullet"):
         climb_trials(problem, plan, (0, 1), engine="magic", workers=2)
 
@@ -138,7 +138,7 @@ def test_a_scatter_that_is_none_is_refused(wrong: dict[str, float]) -> None:
         Scatter(**wrong)
 
 
-def test_no_trials_or_workers_are_refused(problem: ManeuverProblem, plan: Plan) -> None:
+def test_no_trials_or_workers_are_refused(problem: Problem, plan: Plan) -> None:
     with pytest.raises(ArgumentError, match="at least one trial"):
         climb_trials(problem, plan, ())
     with pytest.raises(ArgumentError, match="workers"):

@@ -14,7 +14,7 @@ from trajopt.limits.slip import Slip
 from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path as RobotPath
 from trajopt.paths.samples import sample_path
-from trajopt.problem.given_path import PathProblem, load_path_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.refine.profile import follow
 from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.constants import FRICTION, REACTION_TIME, SCAN_TIME, SONAR_RANGE
@@ -80,16 +80,16 @@ def powerbot_printed_times() -> Figures:
     return found
 
 
-def _experiment(number: int) -> PathProblem:
-    return load_path_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
+def _experiment(number: int) -> Problem:
+    return load_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
 
 
-def _timed(task: PathProblem, variant: Literal["thesis", "physical"], engine: str) -> Trajectory:
+def _timed(task: Problem, variant: Literal["thesis", "physical"], engine: str) -> Trajectory:
     return time_scale(
-        task.spline,
-        task.as_limits(variant=variant),
-        robot=task.platform,
-        ground=task.terrain,
+        task.path,
+        task.replace({"limits.variant": None if variant == "physical" else variant}).limits,
+        robot=task.robot,
+        ground=task.scene.ground,
         engine=engine,
     )
 
@@ -100,7 +100,7 @@ def powerbot_times() -> Figures:
     found = {}
     for number in TIMED:
         task = _experiment(number)
-        found[f"experiment {number}, length, m"] = task.spline.length
+        found[f"experiment {number}, length, m"] = task.path.length
         for variant in VARIANTS:
             for engine in ("linear", "toppra", "auto"):
                 name = f"experiment {number}, {variant} limits, {engine}, s"
@@ -111,11 +111,13 @@ def powerbot_times() -> Figures:
 def powerbot_encounters() -> Figures:
     """Experiment 3: two things appear 0.6 m ahead and go away (printed: 46.5 and 49.3 s)."""
     found, task = {}, _experiment(3)
-    visitors = [Visitor(o.appears, o.clears_after, o.distance, radius=0.15) for o in task.obstacles]
+    visitors = [
+        Visitor(o.appears, o.clears_after, o.distance, radius=0.15) for o in task.encounters
+    ]
     sensor = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME)
     for variant, engine in (("thesis", "linear"), ("physical", "auto")):
         plan = _timed(task, variant, engine)  # type: ignore[arg-type]  # a tuple of literals
-        where = course(plan, task.platform)
+        where = course(plan, task.robot)
         label = f"experiment 3, {variant} limits, {engine}"
         found[f"{label}, planned, s"] = plan.duration
         for rule, planner in (("stops in time", replan), ("halving", halving_plan)):
@@ -129,14 +131,14 @@ def powerbot_encounters() -> Figures:
 def powerbot_following() -> Figures:
     """Experiment 6: following a speed profile (printed: 30.0 s)."""
     found, task = {}, _experiment(6)
-    profile = task.speed_profile()
-    assert profile is not None
+    assert task.profile is not None
+    profile = task.profile.bound
     for manner in ("below", "least_squares"):
         followed = follow(
-            task.spline,
+            task.path,
             profile,
-            task.as_limits(),
-            robot=task.platform,
+            task.limits,
+            robot=task.robot,
             manner=manner,  # type: ignore[arg-type]  # a tuple of literals
         )
         found[f"experiment 6, {manner}, s"] = followed.trajectory.duration

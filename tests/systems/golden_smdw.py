@@ -7,15 +7,16 @@ from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
+from smdw_problems import SMDW, smdw_problem
 
 from tests.systems.golden_data import ROOT, Figures, rows_of
 from trajopt.objectives.terminal import terminal_cost
 from trajopt.pipeline import Solution, solve, validate
-from trajopt.problem.search import WHEELS, load_problem, problem_kind
+from trajopt.problem import load_problem
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
+from trajopt.systems.smdw.entry import WHEELS
 from trajopt.systems.smdw.geometry import contact_offset
 from trajopt.systems.smdw.planner import Maneuver, plan_climb
-from trajopt.systems.smdw.problem import load_maneuver
 from trajopt.systems.smdw.trials import climb_trials
 
 TRIALS = 4  # climbs a configuration and control
@@ -66,7 +67,7 @@ def smdw_wheel() -> Figures:
 
 @cache
 def _maneuver(name: str) -> Maneuver:
-    return plan_climb(load_maneuver(ROOT / "problems" / "smdw" / f"{name}.toml"))
+    return plan_climb(load_problem(ROOT / "problems" / "smdw" / f"{name}.toml"))
 
 
 def smdw_plans() -> Figures:
@@ -95,8 +96,7 @@ def smdw_plan_errors() -> Figures:
 
 @cache
 def _solutions() -> Mapping[str, Solution]:
-    files = sorted((ROOT / "problems" / "smdw").glob("*.toml"))
-    return {f.stem: solve(load_problem(f)) for f in files if problem_kind(f) == "search"}
+    return {name: solve(smdw_problem(name)) for name in SMDW}
 
 
 def smdw_solutions() -> Figures:
@@ -108,7 +108,7 @@ def smdw_solution_errors() -> Figures:
     """The thesis's problems, solved: cost and what the critical wheels miss."""
     found = {}
     for name, solution in _solutions().items():
-        critical = list(solution.problem.goal.critical_indices)
+        critical = list(solution.problem.critical_indices)
         missed = float(np.abs(solution.wheel_deviation[critical]).max())
         found[f"{name}, cost"] = solution.cost
         found[f"{name}, critical wheels' error, rad"] = missed

@@ -93,26 +93,19 @@ def compare(
 
 
 def _timed(plan: Path, set_: list[str] | None, engine: str) -> Trajectory:
-    """The timed motion of a problem file of either kind, or of a run folder."""
-    from trajopt.pipeline import solve, time_path
-    from trajopt.problem.given_path import load_path_problem
-    from trajopt.problem.search import load_problem, problem_kind
+    """The timed motion of a problem file, or of a run folder."""
+    from trajopt.pipeline import solve
+    from trajopt.problem import load_problem
 
-    timed_here = not plan.is_dir() and problem_kind(plan) == "path"
-    if engine != "auto" and not timed_here:
-        raise ArgumentError("--engine", engine, "auto, except for a problem with a table [path]")
     if plan.is_dir():
         from trajopt.report.run_folder import read_solution
 
-        if set_:
-            raise ArgumentError(
-                "--set", set_, "no overrides with a run folder; give the problem file instead"
-            )
+        if set_ or engine != "auto":
+            expected = "neither with a run folder; give the problem file instead"
+            raise ArgumentError("--set, --engine", (set_, engine), expected)
         solution = read_solution(plan)
-    elif timed_here:
-        return time_path(load_path_problem(plan, overrides(set_)), engine=engine)
     else:
-        solution = solve(load_problem(plan, overrides(set_)))
+        solution = solve(load_problem(plan, overrides(set_)), engine=engine)
     if solution.trajectory is None:
         raise ArgumentError(
             "plan", str(plan), "a problem with a feasible motion; " + solution.status

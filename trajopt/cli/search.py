@@ -1,5 +1,4 @@
-"""``trajopt solve | validate | schema``: search control points, time the path, check it in
-physics."""
+"""``trajopt solve | validate | schema``: do a problem's job, check the motion in physics."""
 
 from __future__ import annotations
 
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from trajopt.cli.shared import (
     FAULTY,
@@ -22,6 +22,7 @@ from trajopt.cli.shared import (
 from trajopt.errors import ArgumentError
 
 if TYPE_CHECKING:
+    from trajopt.arrays import Array
     from trajopt.optimize.base import Budget
     from trajopt.pipeline import Solution
 
@@ -49,20 +50,18 @@ def solve(
     ] = None,
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
 ) -> None:
-    """Search control points, time the path, and write what was found."""
+    """Do the job of a problem (search, time a path, plan a climb), and write what was found."""
     from trajopt.pipeline import solve as solve_problem
-    from trajopt.problem.search import load_problem
+    from trajopt.problem import load_problem
     from trajopt.report.tables import solution_table
 
     loaded = load_problem(problem, overrides(set_))
     optimizer = _of_plugin(optimizer, plugin)
-    budget = _budget(evaluations, seconds, target)
-    start = None
-    if x0 is not None:
-        from trajopt.report.run_folder import read_solution
-
-        start = read_solution(x0).search.x
-    with Bar(f"{optimizer}", budget.evaluations) as bar:
+    budget = None
+    if loaded.job.name != "path" or (evaluations, seconds, target) != (None, None, None):
+        budget = _budget(evaluations, seconds, target)
+    start = None if x0 is None else _searched(x0)
+    with Bar(f"{optimizer}", None if budget is None else budget.evaluations) as bar:
         solution = solve_problem(
             loaded, optimizer=optimizer, seed=seed, budget=budget, x0=start, progress=bar.update
         )
@@ -71,7 +70,7 @@ def solve(
         _write(solution, out, seed, pictures)
     if not solution.holds:
         for fault in solution.faults:
-            console.print(f"[red]does not hold:[/red] {fault}")
+            console.print(f"[red]does not hold:[/red] {escape(fault)}")
         raise typer.Exit(FAULTY)
 
 
@@ -105,8 +104,8 @@ def validate(
             control=control_mode(control),
             seed=seed,
         )
-    console.print(validation_table(report))
-    write_validation(report, folder)
+    console.print(validation_table(report, solution.problem.robot))
+    write_validation(report, folder, solution.problem.robot)
     if pictures:
         from trajopt.report.pictures import save_physics_picture
 
@@ -115,28 +114,40 @@ def validate(
 
 
 def schema(
+    kind: Annotated[str, typer.Argument(help="problem or robot")] = "problem",
     out: Annotated[
         Path | None, typer.Option(help="file to write; standard output without it")
     ] = None,
 ) -> None:
-    """Print the JSON schema of problem files, for editors."""
-    from trajopt.problem.search import problem_schema
+    """Print the JSON schema of problem or robot files, for editors."""
+    from trajopt.problem import problem_schema
+    from trajopt.robots.description import RobotDescription
+    from trajopt.schema import json_schema
 
+    if kind not in ("problem", "robot"):
+        raise ArgumentError("kind", kind, "problem or robot")
+    text = problem_schema() if kind == "problem" else json_schema(RobotDescription)
     if out is None:
-        sys.stdout.write(problem_schema())
+        sys.stdout.write(text)
     else:
-        out.write_text(problem_schema(), encoding="utf-8")
+        out.write_text(text, encoding="utf-8")
 
 
 def _write(solution: Solution, out: Path, seed: int, pictures: bool) -> None:
     from trajopt.report.run_folder import write_solution
 
-    write_solution(solution, out, seed=seed, command=" ".join(sys.argv))
-    if pictures:
-        from trajopt.report.pictures import save_pictures
-
-        save_pictures(solution, out)
+    write_solution(solution, out, seed=seed, command=" ".join(sys.argv), pictures=pictures)
     console.print(f"written to {out}", highlight=False, soft_wrap=True)
+
+
+def _searched(folder: Path) -> Array:
+    """The decision that a saved search came to. Raises ArgumentError where nothing was searched."""
+    from trajopt.report.run_folder import read_solution
+
+    search = read_solution(folder).search
+    if search is None:
+        raise ArgumentError("--x0", str(folder), "the folder of a search")
+    return search.x
 
 
 def _of_plugin(optimizer: str, plugin: Path | None) -> str:

@@ -50,7 +50,7 @@ def overrides(items: list[str] | None) -> dict[str, Any]:
     for item in items or []:
         key, sign, text = item.partition("=")
         if not sign or not key:
-            raise ArgumentError("--set", item, "key=value, e.g. spline.duration=3.5")
+            raise ArgumentError("--set", item, "key=value, e.g. limits.speed=0.5")
         try:
             found[key.strip()] = tomllib.loads(f"value = {text}")["value"]
         except tomllib.TOMLDecodeError:

@@ -1,9 +1,6 @@
-"""Keeping a robot's footprint inside a space and out of a step, along the whole path, as a
-violation.
+"""Keeping a robot's footprint on free ground along the whole path, as a violation.
 
-Space (a rectangle) and the free side of the step (a half-plane) are convex, so a footprint lies
-inside them exactly when its corners do. The violation is the depth (m) of the worst corner at the
-worst place; searches see it on a coarse grid with a small reserve, ``score`` recomputes it without
+The violation is the depth (m) by which it leaves that ground at the worst place; searches see it on a coarse grid with a small reserve, ``score`` recomputes it without
 one on a grid ten times finer.
 """
 
@@ -17,8 +14,11 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
+from trajopt.objectives.duration import DurationObjective
 from trajopt.objectives.on_terminal import OnTerminal
 from trajopt.objectives.rollout import step_grid
+from trajopt.objectives.terminal import TerminalObjective
+from trajopt.world.crossing import Standing
 from trajopt.world.free_ground import FreeGround, path_margin
 
 SEARCH_STEPS = 36  # steps along the path in a search, chosen: 6 cm on a 2 m path
@@ -29,15 +29,21 @@ RESERVE = (
 
 @dataclass(frozen=True)
 class ClearObjective(OnTerminal):
-    """A terminal objective whose violation says how far the footprint leaves its free ground
-    (m)."""
+    """An objective whose violation also says how far the footprint leaves its free ground (m): the
+    terminal one, or ``duration``."""
 
-    ground: FreeGround
+    ground: FreeGround | Standing
     steps: int = SEARCH_STEPS
+    duration: DurationObjective | None = None
+
+    @property
+    def inner(self) -> TerminalObjective | DurationObjective:
+        """What costs."""
+        return self.terminal if self.duration is None else self.duration
 
     @property
     def provides(self) -> frozenset[Capability]:
-        return self.terminal.provides - {Capability.GRADIENT}
+        return self.inner.provides - {Capability.GRADIENT}
 
     @cached_property
     def _values(self) -> Array:
@@ -51,33 +57,33 @@ class ClearObjective(OnTerminal):
         return np.asarray(self.ground.margin(*poses).min(axis=0))
 
     def evaluate(self, candidates: Array) -> Evaluation:
-        inner = self.terminal.evaluate(candidates)
+        inner = self.inner.evaluate(candidates)
         return Evaluation(
             inner.cost, inner.violation + np.maximum(RESERVE - self.margins(candidates), 0.0)
         )
 
     def score(self, candidate: Array) -> Evaluation:
-        inner = self.terminal.score(candidate)
+        inner = self.inner.score(candidate)
         depth = max(0.0, -path_margin(self.path(candidate), self.ground))
         return Evaluation(inner.cost, inner.violation + depth)
 
     def terms(self, candidate: Array) -> dict[str, float]:
         """Named cost terms of one candidate (d,)."""
-        return self.terminal.terms(candidate)
+        return self.inner.terms(candidate)
 
     # -- what the lattice, Newton and IPOPT ask for: the terminal objective's own
     # ------------------------
 
     def effort(self, candidates: Array) -> Array:
-        """(n,): peak wheel rate; candidates that leave the free ground come after all that stay
+        """(n,): the inner objective's; candidates that leave the free ground come after all that stay
         inside."""
-        effort = self.terminal.effort(candidates)
+        effort = self.inner.effort(candidates)
         outside = np.maximum(RESERVE - self.margins(candidates), 0.0)
         return np.where(outside > 0, effort.max(initial=0.0) + 1.0 + outside, effort)
 
     def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:
-        """The terminal program with one row more for every corner, border and search step: room >=
-        reserve."""
+        """The terminal program with one row more for every room of the ground (corner and border)
+        and search step: room >= reserve. Obstacles have none: only scores see them."""
         inner = self.terminal.symbolic(z, parameters)
         points = self.terminal.control_points(z[: self.dimension])
         rooms = self.ground.rooms(

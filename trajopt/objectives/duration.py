@@ -38,7 +38,7 @@ class DurationObjective(OnTerminal):
         try:
             return time_scale(
                 self.path(candidate),
-                problem.limits.as_limits(),
+                problem.limits,
                 robot=self.terminal.robot,
                 gridpoints=gridpoints,
             ).duration
@@ -48,7 +48,8 @@ class DurationObjective(OnTerminal):
     def _violation(self, candidates: Array) -> Array:
         section = self.terminal.problem.objective
         errors = self.terminal.wheel_errors(self.terminal.predict(candidates.T))
-        worst = np.max([np.abs(fold(np.asarray(e)[0], section.period)) for e in errors], axis=0)
+        folded = [np.abs(fold(np.asarray(e)[0], section.period)) for e in errors]
+        worst = np.max([np.zeros(len(candidates)), *folded], axis=0)
         return np.asarray(np.maximum(worst - section.wheel_tolerance, 0.0))
 
     def evaluate(self, candidates: Array) -> Evaluation:

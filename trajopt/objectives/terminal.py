@@ -22,10 +22,9 @@ from trajopt.objectives.exact import exact_terminal
 from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
 from trajopt.paths.path import Path
 from trajopt.paths.spline import SplineBasis, uniform_basis
-from trajopt.problem.search import Problem
+from trajopt.problem import Problem
 from trajopt.robots.actuator import Actuator
 from trajopt.robots.robot import Robot
-from trajopt.robots.robot import robot as shipped
 
 SEARCH_STEPS = 252  # 84 steps a spline segment, 14 to 20 ms on the problems at hand; chosen
 COARSE_STEPS = 84  # steps for Newton steps, chosen
@@ -74,13 +73,18 @@ class TerminalObjective:
     @cached_property
     def actuator(self) -> Actuator:
         section = self.problem.actuator
-        return Actuator(section.saturation, section.dead_zone) if section.enabled else Actuator()
+        return Actuator() if section is None else section.drive
+
+    @property
+    def nominal_duration(self) -> float:
+        """s; drives that follow end at the same angles whatever it is."""
+        return 1.0 if self.problem.actuator is None else self.problem.actuator.duration
 
     @property
     def is_affine(self) -> bool:
         """Whether the critical wheel angles are affine in the decision variables (modulo the
         period)."""
-        return self.actuator.is_ideal and set(self.problem.spline.free) <= {"p1", "p2"}
+        return self.actuator.is_ideal and set(self.problem.search.free) <= {"p1", "p2"}
 
     @property
     def provides(self) -> frozenset[Capability]:
@@ -106,7 +110,7 @@ class TerminalObjective:
             "duration": ("duration_s",),
         }
         return tuple(
-            name for key in parts if key in self.problem.spline.free for name in parts[key]
+            name for key in parts if key in self.problem.search.free for name in parts[key]
         )
 
     @property
@@ -117,14 +121,14 @@ class TerminalObjective:
     def bounds(self) -> Array:
         """(d, 2): the navigation space for points; margins around start and goal for heading;
         duration."""
-        p = self.problem
-        yaws = (p.start.pose[2], p.goal.pose[2])
+        p = self.problem.search
+        yaws = (p.start[2], p.goal[2])
         heading = (min(yaws) - HEADING_MARGIN, max(yaws) + HEADING_MARGIN)
         by_suffix = {
             "x_m": p.space.x,
             "y_m": p.space.y,
             "yaw_rad": heading,
-            "duration_s": tuple(f * p.spline.duration for f in DURATION_RANGE),
+            "duration_s": tuple(f * self.nominal_duration for f in DURATION_RANGE),
         }
         return np.array([by_suffix[name.split(".")[-1]] for name in self.names], dtype=np.float64)
 
@@ -140,13 +144,13 @@ class TerminalObjective:
             "p2.y_m": p2[1],
             "p1.yaw_rad": yaw[0],
             "p2.yaw_rad": yaw[1],
-            "duration_s": self.problem.spline.duration,
+            "duration_s": self.nominal_duration,
         }
         return np.clip([values[name] for name in self.names], self.bounds[:, 0], self.bounds[:, 1])
 
     @property
     def _fixed_points(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
-        (x0, y0, a0), (xf, yf, af) = self.problem.start.pose, self.problem.goal.pose
+        (x0, y0, a0), (xf, yf, af) = self.problem.search.start, self.problem.search.goal
         p1 = (x0 + (xf - x0) / 2.5, y0 + (yf - y0) / 3)  # Table 5.4 with x_min = x_0, x_max = x_f
         p2 = (x0 + (xf - x0) * 2 / 3, y0 + (yf - y0) * 2 / 3)
         return p1, p2, (a0 + (af - a0) / 3, a0 + (af - a0) * 2 / 3)
@@ -154,9 +158,9 @@ class TerminalObjective:
     def control_points(self, z: Any) -> ControlPoints:
         """Control values from decision variables ``z`` (d, n): arrays or symbols, candidates in
         columns."""
-        free, column = self.problem.spline.free, 0 * z[0:1]
+        free, column = self.problem.search.free, 0 * z[0:1]
         rows = dict(zip(self.names, (z[i : i + 1] for i in range(self.dimension)), strict=True))
-        (x0, y0, a0), (xf, yf, af) = self.problem.start.pose, self.problem.goal.pose
+        (x0, y0, a0), (xf, yf, af) = self.problem.search.start, self.problem.search.goal
         p1, p2, yaw = self._fixed_points
         x1, y1 = (
             (rows["p1.x_m"], rows["p1.y_m"]) if "p1" in free else (column + p1[0], column + p1[1])
@@ -167,9 +171,7 @@ class TerminalObjective:
         a1, a2 = column + yaw[0], column + yaw[1]
         if "heading" in free:
             a1, a2 = rows["p1.yaw_rad"], rows["p2.yaw_rad"]
-        duration = (
-            rows["duration_s"] if "duration" in free else column + self.problem.spline.duration
-        )
+        duration = rows["duration_s"] if "duration" in free else column + self.nominal_duration
         return ControlPoints(
             np.vstack([column + x0, x1, x2, column + xf]),
             np.vstack([column + y0, y1, y2, column + yf]),
@@ -222,12 +224,13 @@ class TerminalObjective:
 
     def wheel_errors(self, final: Terminal) -> list[Any]:
         """Critical wheel angle minus wanted angle, unfolded, rad, one entry a critical wheel."""
-        start, goal = self.problem.start.wheels, self.problem.goal
-        return [final.wheels[i] + (start[i] - goal.wheels[i]) for i in goal.critical_indices]
+        start, task = self.problem.start_wheels.tolist(), self.problem.search
+        wanted = task.wheels.tolist()
+        return [final.wheels[i] + (start[i] - wanted[i]) for i in task.critical]
 
     def pose_errors(self, final: Terminal) -> tuple[Any, Any, Any]:
         """Final minus wanted x, y (m), yaw (rad)."""
-        x, y, yaw = self.problem.goal.pose
+        x, y, yaw = self.problem.search.goal
         return final.x - x, final.y - y, final.yaw - yaw
 
     def named_terms(self, final: Terminal) -> dict[str, Any]:
@@ -239,7 +242,7 @@ class TerminalObjective:
                 ("x", "y", "yaw"), section.pose_gains, self.pose_errors(final), strict=True
             )
         }
-        for name, error in zip(self.problem.goal.critical, self.wheel_errors(final), strict=True):
+        for name, error in zip(self.problem.critical, self.wheel_errors(final), strict=True):
             terms[f"wheel {name}"] = section.wheel_gain * np.abs(fold(error, section.period))
         return terms
 
@@ -260,7 +263,7 @@ class TerminalObjective:
         from trajopt.objectives import heading_swarm, swarm
 
         points = self.control_points(self.default[:, None])
-        heading = ("p1.yaw_rad", "p2.yaw_rad") if "heading" in self.problem.spline.free else ()
+        heading = ("p1.yaw_rad", "p2.yaw_rad") if "heading" in self.problem.search.free else ()
         rows = [
             self.names.index(name) if name in self.names else -1
             for name in ("p1.x_m", "p1.y_m", "p2.x_m", "p2.y_m", *heading, "duration_s")
@@ -276,12 +279,12 @@ class TerminalObjective:
             float(points.duration[0, 0]),
             np.array(rows),
         )
-        section, goal = self.problem.objective, self.problem.goal
+        section, task = self.problem.objective, self.problem.search
         wheel_gains = np.zeros(4)
-        wheel_gains[list(goal.critical_indices)] = section.wheel_gain
-        travel = np.subtract(goal.wheels, self.problem.start.wheels)
+        wheel_gains[list(task.critical)] = section.wheel_gain
+        travel = task.wheels - self.problem.start_wheels
         return plan, swarm.Goal(
-            np.array(goal.pose), np.array(section.pose_gains), travel, wheel_gains, section.period
+            np.array(task.goal), np.array(section.pose_gains), travel, wheel_gains, section.period
         )
 
     def evaluate(self, candidates: Array) -> Evaluation:
@@ -341,7 +344,7 @@ class TerminalObjective:
     def residual_gains(self) -> Array:
         """(m,): the cost's gain on the magnitude of each residual."""
         section = self.problem.objective
-        wheels = [section.wheel_gain] * len(self.problem.goal.critical)
+        wheels = [section.wheel_gain] * len(self.problem.critical)
         return np.array(wheels if self.actuator.is_ideal else [*section.pose_gains, *wheels])
 
     def affine(self) -> tuple[Array, Array]:
@@ -354,7 +357,7 @@ class TerminalObjective:
         if not self.is_affine:
             raise ArgumentError(
                 "spline.free",
-                list(self.problem.spline.free),
+                list(self.problem.search.free),
                 "p1 and p2 only, and no actuator, for affine wheel angles",
             )
         part = self.affine_part()
@@ -363,8 +366,11 @@ class TerminalObjective:
     def affine_part(self) -> AffinePart:
         """The affine residuals of p1 and p2 with ideal actuators, everything else at its default.
 
-        Without p1 and p2 among the free values its matrix has no columns.
+        Without p1 and p2 among the free values its matrix has no columns. Raises ArgumentError
+        where no wheel is critical.
         """
+        if not self.problem.critical:
+            raise ArgumentError("goal.critical", None, "critical wheels, for exact wheel angles")
         variables = np.array(
             [i for i, name in enumerate(self.names) if name.endswith(("x_m", "y_m"))], dtype=np.intp
         )
@@ -417,7 +423,7 @@ class TerminalObjective:
         ``z`` (d + m, 1) holds the decision variables and one slack a residual: minimise gains .
         slack subject to slack - r >= 0 and slack + r >= 0, so that slack = |r| at the optimum.
         """
-        turns = [parameters[i : i + 1] for i in range(len(self.problem.goal.critical))]
+        turns = [parameters[i : i + 1] for i in range(len(self.problem.critical))]
         r = self.residuals(z[: self.dimension], turns)
         slack = [z[self.dimension + i : self.dimension + i + 1] for i in range(len(r))]
         cost: Any = 0.0
@@ -462,7 +468,7 @@ def terminal_cost(
 
 def terminal_objective(problem: Problem, *, steps: int = SEARCH_STEPS) -> TerminalObjective:
     """The terminal objective of a problem on its own robot."""
-    return TerminalObjective(problem, shipped(problem.robot.name), steps)
+    return TerminalObjective(problem, problem.robot, steps)
 
 
 def with_free(problem: Problem, *free: str) -> Problem:

@@ -28,6 +28,7 @@ from trajopt.objectives.base import (
     SymbolicProblem,
 )
 from trajopt.optimize.base import (
+    FEASIBLE,
     Run,
     Starts,
     Status,
@@ -75,7 +76,8 @@ class Ipopt(Method):
             stats = program.solver.stats()
             starts.ended(bool(stats["success"]), str(stats["return_status"]))
             if residual:
-                exact = float(run.objective.score(x).cost[0]) <= EXACT
+                scored = run.objective.score(x)
+                exact = bool(scored.cost[0] <= EXACT and scored.violation[0] <= FEASIBLE)
                 successes += exact
                 if exact and self.stop_when_exact:
                     break

@@ -76,11 +76,10 @@ class Lattice(Method):
         every = np.tile(part.base, (len(points), 1))
         every[:, part.variables] = points
         candidates = every[: run.remaining()]
-        cost = _evaluated(run, candidates)
+        cost, violation = _evaluated(run, candidates)
         # Where the cost is no deviation (duration), it ranks exact solutions itself.
-        order = np.argsort(
-            cost if objective.constrained else objective.effort(candidates), kind="stable"
-        )
+        by_cost = Capability.SYMBOLIC not in objective.provides
+        order = np.lexsort((cost if by_cost else objective.effort(candidates), violation))
         candidates, turns = candidates[order], turns[: len(candidates)][order]
         if Capability.AFFINE not in objective.provides:
             return self._through_actuators(run, objective, part, candidates, rng, turns)
@@ -90,7 +89,7 @@ class Lattice(Method):
         if np.max(np.abs(misses[0])) > EXACT:
             return Status.NO_EXACT, "the critical wheels over-determine the control points"
         compared = "" if len(candidates) == len(every) else f", {len(candidates)} of them compared"
-        taken = "the fastest" if objective.constrained else "the one with the least effort"
+        taken = "the fastest" if by_cost else "the one with the least effort"
         return (
             Status.CONVERGED,
             f"{len(every)} exact solutions found inside the bounds{compared}, {taken} taken",
@@ -158,12 +157,11 @@ class Lattice(Method):
         return Status.NO_EXACT, "no lattice point lies inside the bounds"
 
 
-def _evaluated(run: Run, candidates: Array) -> Array:
-    """(n,): costs, in batches small enough to keep to a budget in seconds."""
-    parts = [
-        run.evaluate(candidates[i : i + _BATCH]).cost for i in range(0, len(candidates), _BATCH)
-    ]
-    return np.concatenate(parts)
+def _evaluated(run: Run, candidates: Array) -> tuple[Array, Array]:
+    """Costs and violations (n,), in batches small enough to keep to a budget in seconds."""
+    parts = [run.evaluate(candidates[i : i + _BATCH]) for i in range(0, len(candidates), _BATCH)]
+    cost, violation = ([getattr(part, name) for part in parts] for name in ("cost", "violation"))
+    return np.concatenate(cost), np.concatenate(violation)
 
 
 def has_influence(part: AffinePart) -> bool:

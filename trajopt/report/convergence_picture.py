@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trajopt.arrays import Array, BoolArray
-from trajopt.optimize.base import FEASIBLE, Status
+from trajopt.optimize.base import FEASIBLE, OptimizeResult, Status
 from trajopt.pipeline import Solution
 from trajopt.report.style import BLUE, GREY, ORANGE, VERMILION, new_figure
 
@@ -20,9 +20,9 @@ _WORDS = {
 }
 
 
-def convergence_figure(solution: Solution) -> Figure:
+def convergence_figure(solution: Solution, search: OptimizeResult) -> Figure:
     """Best cost over evaluations, and below it the best violation where the search ever met one."""
-    search, history = solution.search, solution.search.history
+    history = search.history
     broken = bool(np.any(history.violation > FEASIBLE)) or not search.violation <= FEASIBLE
     figure = new_figure(4.6 if broken else 3.2)
     if broken:
@@ -34,17 +34,17 @@ def convergence_figure(solution: Solution) -> Figure:
     if timed:  # where wheel angles miss, searches rank by violation, and the cost is no duration
         drawn = _curve(
             cost,
-            solution,
+            search,
             np.where(feasible, history.cost, np.nan),
             feasible,
             search.fun if search.violation <= FEASIBLE else np.inf,
         )
     else:
-        drawn = _curve(cost, solution, history.cost, feasible, search.fun)
+        drawn = _curve(cost, search, history.cost, feasible, search.fun)
     _log_where_wide(cost, drawn)
     cost.set_ylabel("duration (s)" if timed else "terminal cost (–)")
     if violation is not None:
-        drawn = _curve(violation, solution, history.violation, feasible, search.violation)
+        drawn = _curve(violation, search, history.violation, feasible, search.violation)
         _log_where_wide(violation, drawn)
         violation.set_ylabel("violation (–)")
     lowest = cost if violation is None else violation
@@ -70,11 +70,11 @@ def _final(solution: Solution) -> str:
 
 
 def _curve(
-    axes: Axes, solution: Solution, values: Array, feasible: BoolArray, final: float
+    axes: Axes, search: OptimizeResult, values: Array, feasible: BoolArray, final: float
 ) -> Array:
     """Staircase of the best so far, dashed while infeasible, and the recomputed final value; what
     was drawn."""
-    history, nfev = solution.search.history, solution.search.nfev
+    history, nfev = search.history, search.nfev
     kept = np.isfinite(values)
     count, best, good = history.evaluations[kept], values[kept], feasible[kept]
     drawn = [*best, *([final] if np.isfinite(final) else [])]

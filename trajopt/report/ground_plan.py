@@ -1,5 +1,5 @@
-"""What pictures of the ground share: robot outlines, the navigation space, the obstacle, room
-around it all."""
+"""What pictures of the ground share: robot outlines, the navigation space, obstacles, room around
+it all."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon, Rectangle
 
-from trajopt.arrays import Array, fold
-from trajopt.problem.search import WHEELS, Problem
+from trajopt.arrays import Array
+from trajopt.problem.task import Space
 from trajopt.report.style import BLACK, GREY, LIGHT
 from trajopt.robots.robot import Robot
+from trajopt.world.scene import Scene
 
 _NOSE = 0.22  # share of the robot's length that the mark of its front takes, chosen
-_SLAB = 0.06  # m, drawn depth of the obstacle, chosen
-_SQUARE = np.radians(
-    60.0
-)  # largest angle at which the robot is taken to meet an edge across its start yaw, chosen
+_RAMP = 2.0  # m, drawn width of a ramp, chosen
+_ROOM = 0.15  # m, around a motion in which obstacles are drawn, chosen
 
 
 def outline(robot: Robot, pose: Array) -> Array:
@@ -77,9 +76,9 @@ def draw_robot(
     )
 
 
-def draw_space(axes: Axes, problem: Problem) -> None:
+def draw_space(axes: Axes, space: Space) -> None:
     """The navigation space, where control points may lie."""
-    (x0, x1), (y0, y1) = problem.space.x, problem.space.y
+    (x0, x1), (y0, y1) = space.x, space.y
     axes.add_patch(
         Rectangle(
             (x0, y0),
@@ -94,51 +93,38 @@ def draw_space(axes: Axes, problem: Problem) -> None:
     )
 
 
-def obstacle_strip(problem: Problem, robot: Robot, width: float) -> tuple[Array, float] | None:
-    """(4, 2) corners of a strip for the obstacle's near edge, m, and the yaw it faces; None for
-    level ground.
-
-    Problem files give the obstacle's height, not its place. It is drawn where the robot's outline
-    touches it at the goal, across the start's heading, or across the way the goal pose meets it
-    where that differs by more than 60 degrees.
-    """
-    if problem.scene.obstacle_height <= 0:
-        return None
-    start, goal = np.asarray(problem.start.pose), np.asarray(problem.goal.pose)
-    meets = goal[2]
-    if problem.scene.motion == "lateral":
-        left = sum(1 if "left" in WHEELS[i] else -1 for i in problem.goal.critical_indices)
-        meets = goal[2] + (np.pi / 2 if left >= 0 else -np.pi / 2)
-    turned = fold(meets - start[2])
-    yaw = float(start[2] if abs(turned) <= _SQUARE else meets)
-    ahead, along = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
-    reach = float(np.max((outline(robot, goal) - goal[:2]) @ ahead))
-    near = goal[:2] + reach * ahead
-    strip = [
-        near - along * width / 2,
-        near + along * width / 2,
-        near + along * width / 2 + ahead * _SLAB,
-        near - along * width / 2 + ahead * _SLAB,
-    ]
-    return np.array(strip), yaw
-
-
-def draw_obstacle(axes: Axes, problem: Problem, robot: Robot) -> None:
-    """The obstacle's near edge as a hatched strip, where there is one."""
-    found = obstacle_strip(problem, robot, 1.2)
-    if found is not None:
-        height = problem.scene.obstacle_height
+def draw_scene(axes: Axes, scene: Scene) -> None:
+    """Obstacles hatched, ramps as plain strips."""
+    for k, ramp in enumerate(getattr(scene.ground, "ramps", ())):
+        ahead = np.array([np.cos(ramp.direction), np.sin(ramp.direction)])
+        foot, along = np.array(ramp.place), _RAMP / 2 * np.array([-ahead[1], ahead[0]])
+        top = foot + ramp.run * ahead
+        label = f"ramp, {ramp.height:g} m high (drawn {_RAMP:g} m wide)"
+        strip = np.array([foot - along, foot + along, top + along, top - along])
+        axes.add_patch(
+            Polygon(strip, facecolor="#eee9f2", edgecolor=LIGHT, label=None if k else label)
+        )
+    for thing in scene.obstacles:
         axes.add_patch(
             Polygon(
-                found[0].tolist(),
+                thing.outline,
                 closed=True,
                 facecolor="#e4ddd0",
                 edgecolor=GREY,
                 hatch="//////",
                 linewidth=0.8,
-                label=f"obstacle, {height:g} m high (place inferred)",
+                zorder=0.3,
+                label=f"{thing.name}, {thing.height:g} m high",
             )
         )
+
+
+def near_points(scene: Scene, seen: Array) -> Array:
+    """(N, 2): points of the obstacles, moved into the box around ``seen`` (N, 2) with a little
+    room, so that a picture shows what stands there and not the whole of it."""
+    corners = [np.array(thing.outline) for thing in scene.obstacles]
+    low, high = seen.min(axis=0) - _ROOM, seen.max(axis=0) + _ROOM
+    return np.asarray(np.clip(np.vstack([*corners, seen[:1]]), low, high))
 
 
 def frame_points(axes: Axes, points: Array, margin: float = 0.05) -> None:

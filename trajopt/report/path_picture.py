@@ -1,4 +1,4 @@
-"""The planned path: control points, robot outlines along it, navigation space, obstacle, what was
+"""The path: control points, robot outlines along it, navigation space, obstacles, what was
 explored."""
 
 from __future__ import annotations
@@ -6,16 +6,20 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 
 from trajopt.arrays import Array
+from trajopt.objectives.terminal import terminal_objective
+from trajopt.optimize.base import OptimizeResult
+from trajopt.paths.path import Path
 from trajopt.pipeline import Solution
 from trajopt.report.ground_plan import (
-    draw_obstacle,
     draw_robot,
+    draw_scene,
     draw_space,
     frame_points,
     mark_pose,
-    obstacle_strip,
+    near_points,
     outline,
 )
 from trajopt.report.style import (
@@ -30,32 +34,36 @@ from trajopt.report.style import (
     WIDTH,
     new_figure,
 )
-from trajopt.robots.robot import robot as shipped
+from trajopt.world.crossing import crossings
 
 _MOMENTS = 6  # robot outlines between start and goal, chosen
 _MOST_DOTS = 20_000  # explored candidates that are drawn, chosen
+_MOST_NAMED = 8  # control points whose names are drawn, chosen
 
 
-def path_figure(solution: Solution) -> Figure:
-    """Figure of the path in the world, equal scales, m."""
-    problem, robot = solution.problem, shipped(solution.problem.robot.name)
-    start, goal = np.asarray(problem.start.pose), np.asarray(problem.goal.pose)
-    poses = _poses(solution)
-    ends = [outline(robot, pose) for pose in (start, goal, *poses)]
-    corners = np.column_stack([problem.space.x, problem.space.y])
-    strip = obstacle_strip(problem, robot, 1.2)
-    seen = np.vstack([*ends, corners, poses[:, :2], *([] if strip is None else [strip[0]])])
+def path_figure(solution: Solution, path: Path) -> Figure:
+    """Figure of the path in the world with what stands there, equal scales, m."""
+    problem, robot = solution.problem, solution.problem.robot
+    poses = _poses(solution, path)
+    goal = poses[-1] if problem.goal is None else np.array(problem.goal.pose)
+    seen = np.vstack([outline(robot, pose) for pose in (goal, *poses)])
+    if problem.space is not None:
+        seen = np.vstack([seen, np.column_stack([problem.space.x, problem.space.y])])
+    seen = np.vstack([seen, near_points(problem.scene, seen)])
     span = np.ptp(seen, axis=0) * 1.1
     figure = new_figure(float(np.clip((WIDTH - 0.6) * span[1] / span[0] + 1.5, 3.2, 8.0)))
     axes = figure.add_subplot()
-    draw_space(axes, problem)
-    _draw_explored(axes, solution)
-    draw_obstacle(axes, problem, robot)
+    if problem.space is not None:
+        draw_space(axes, problem.space)
+    if solution.search is not None:
+        _draw_explored(axes, solution, solution.search)
+    draw_scene(axes, problem.scene)
     for pose in poses[np.linspace(0, len(poses) - 1, _MOMENTS + 2).round().astype(int)[1:-1]]:
         draw_robot(axes, robot, pose, zorder=2.2)
-    draw_robot(axes, robot, start, GREEN, strong=True, label="start", zorder=2.4)
+    draw_robot(axes, robot, poses[0], GREEN, strong=True, label="start", zorder=2.4)
     draw_robot(axes, robot, goal, VERMILION, strong=True, label="goal", zorder=2.4)
     axes.plot(poses[:, 0], poses[:, 1], color=BLUE, linewidth=2.0, zorder=2.6, label="path")
+    _draw_crossings(axes, solution, path)
     _draw_control_points(axes, solution)
     frame_points(axes, seen)
     axes.set_title(_title(solution))
@@ -63,29 +71,42 @@ def path_figure(solution: Solution) -> Figure:
     return figure
 
 
+def _draw_crossings(axes: Axes, solution: Solution, path: Path) -> None:
+    """Outlines where they come into an obstacle and leave it."""
+    robot, label = solution.problem.robot, "outline crosses an obstacle"
+    for crossing in crossings(path, robot.footprint, solution.problem.scene.obstacles):
+        u = path.locate(np.linspace(crossing.start, crossing.end, 3))
+        for x, y, yaw in np.column_stack([path.position(u)[:, :2], path.yaw(u)]):
+            corners = outline(robot, np.array([x, y, yaw]))
+            axes.add_patch(
+                Polygon(corners, fill=False, edgecolor="red", lw=1.2, zorder=2.8, label=label)
+            )
+            label = ""
+
+
 def _title(solution: Solution) -> str:
-    found = f"{solution.search.optimizer}, cost {solution.cost:.3g}"
+    search = solution.search
+    found = "" if search is None else f"{search.optimizer}, cost {solution.cost:.3g}, "
     timed = (
         "no motion keeps the limits"
         if solution.trajectory is None
         else f"{solution.duration:.2f} s"
     )
-    return f"{solution.problem.title}: {found}, {timed}"
+    return f"{solution.problem.title}: {found}{timed}"
 
 
-def _poses(solution: Solution) -> Array:
+def _poses(solution: Solution, path: Path) -> Array:
     """(N, 3): poses along the path, evenly in time where it is timed, else along the path."""
     if solution.trajectory is not None:
         return solution.trajectory.at(np.linspace(0.0, solution.trajectory.duration, 400)).pose
-    path = solution.path
     u = path.locate(np.linspace(0.0, path.length, 400))
     return np.column_stack([path.position(u)[:, :2], path.yaw(u)])
 
 
-def _draw_explored(axes: Axes, solution: Solution) -> None:
+def _draw_explored(axes: Axes, solution: Solution, search: OptimizeResult) -> None:
     """Explored positions of P1 and P2 as dots, fainter the more there are."""
-    names = _decision_names(solution)
-    samples = solution.search.history.samples
+    names = terminal_objective(solution.problem).names
+    samples = search.history.samples
     samples = samples[:: max(1, len(samples) // _MOST_DOTS)]
     if not len(samples):
         return
@@ -111,7 +132,7 @@ def _draw_explored(axes: Axes, solution: Solution) -> None:
             color=colour,
             alpha=0.7,
             linewidths=0,
-            label=f"explored {point.upper()} ({len(solution.search.history.samples)})",
+            label=f"explored {point.upper()} ({len(search.history.samples)})",
         )
 
 
@@ -132,12 +153,5 @@ def _draw_control_points(axes: Axes, solution: Solution) -> None:
         zorder=3.0,
         label="control points",
     )
-    for i, point in enumerate(points):
+    for i, point in enumerate(points if len(points) <= _MOST_NAMED else ()):
         mark_pose(axes, point, f"P{i}", (0.0, 11.0))
-
-
-def _decision_names(solution: Solution) -> tuple[str, ...]:
-    from trajopt.objectives.duration import DurationObjective
-
-    objective = solution.objective
-    return (objective.terminal if isinstance(objective, DurationObjective) else objective).names

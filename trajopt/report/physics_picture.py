@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
 from trajopt.pipeline import Solution
-from trajopt.report.ground_plan import draw_robot, frame_points, outline
-from trajopt.report.run_folder import wheel_names
+from trajopt.report.ground_plan import draw_robot, draw_scene, frame_points, outline
 from trajopt.report.style import (
     BLACK,
     BLUE,
@@ -24,7 +23,6 @@ from trajopt.report.style import (
     legend_beside,
     new_figure,
 )
-from trajopt.robots.robot import robot as shipped
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
@@ -41,10 +39,7 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
         raise ArgumentError("solution", solution.status, "a solution with a trajectory")
     times, end = recording.times, trajectory.duration
     error = 1e3 * (recording.pose - report.planned)
-    planned_wheels = (
-        np.asarray(solution.problem.start.wheels)
-        + trajectory.at(np.minimum(times, end)).wheel_angles
-    )
+    planned_wheels = trajectory.at(np.minimum(times, end)).wheel_angles
     figure = new_figure(9.0)
     panels: list[Axes] = list(
         figure.subplots(4, 1, gridspec_kw={"height_ratios": [3.4, 1.2, 1.0, 1.3]})
@@ -56,7 +51,7 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
     panels[1].set_ylabel("position error (mm)")
     panels[2].plot(times, error[:, 2], color=BLACK)
     panels[2].set_ylabel("yaw error (mrad)")
-    for i, name in enumerate(wheel_names(planned_wheels.shape[1])):
+    for i, name in enumerate(solution.problem.robot.wheel_names):
         panels[3].plot(
             times,
             1e3 * (recording.wheel_angles[:, i] - planned_wheels[:, i]),
@@ -86,8 +81,9 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
 
 
 def _draw_paths(axes: Axes, solution: Solution, report: ValidationReport) -> None:
-    robot, pose = shipped(solution.problem.robot.name), report.recording.pose
+    robot, pose = solution.problem.robot, report.recording.pose
     planned, final = report.planned[-1], pose[-1]
+    draw_scene(axes, solution.problem.scene)
     draw_robot(axes, robot, report.planned[0], GREEN, strong=True, label="start")
     draw_robot(axes, robot, planned, GREY, strong=True, label="end, planned")
     draw_robot(axes, robot, final, VERMILION, strong=True, label="end, simulated")

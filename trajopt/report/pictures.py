@@ -19,17 +19,19 @@ if TYPE_CHECKING:
 
 
 def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath, ...]:
-    """Draw path.png, convergence.png and, for a solution with a trajectory, profile.png. Returns
-    the files.
+    """Draw path.png, where there is a path, convergence.png, where control points were searched, and
+    profile.png, where there is a trajectory. Returns the files.
 
     Raises ArgumentError where the folder cannot be written.
     """
     place = made_folder(folder)
     with in_style():
-        files = [
-            save_figure(path_figure(solution), place / "path.png"),
-            save_figure(convergence_figure(solution), place / "convergence.png"),
-        ]
+        files = []
+        if solution.path is not None:
+            files.append(save_figure(path_figure(solution, solution.path), place / "path.png"))
+        if solution.search is not None:
+            figure = convergence_figure(solution, solution.search)
+            files.append(save_figure(figure, place / "convergence.png"))
         if solution.trajectory is not None:
             files.append(
                 save_figure(profile_figure(solution, solution.trajectory), place / "profile.png")

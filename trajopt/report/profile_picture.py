@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from trajopt.arrays import Array
+from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.samples import sample_at
 from trajopt.pipeline import MARGIN, Solution
-from trajopt.report.run_folder import binding_shares, wheel_names
+from trajopt.report.run_folder import binding_shares
 from trajopt.report.style import (
     BLACK,
     BLUE,
@@ -44,7 +45,7 @@ def profile_figure(solution: Solution, trajectory: Trajectory) -> Figure:
     in use."""
     times = np.linspace(0.0, trajectory.duration, _SAMPLES)
     state = trajectory.at(times)
-    limits = solution.problem.limits
+    limits = solution.problem.limits_section
     figure = new_figure(9.2)
     panels: Sequence[Axes] = figure.subplots(
         6, 1, sharex=True, gridspec_kw={"height_ratios": [1, 0.8, 1.1, 0.8, 1.4, 1.2]}
@@ -133,7 +134,7 @@ def _limit_lines(axes: Axes, value: float | None, label: str, *, both: bool) -> 
 
 
 def _draw_wheels(axes: Axes, times: Array, speeds: Array, solution: Solution) -> None:
-    for i, name in enumerate(wheel_names(speeds.shape[1])):
+    for i, name in enumerate(solution.problem.robot.wheel_names):
         axes.plot(
             times,
             speeds[:, i],
@@ -142,10 +143,10 @@ def _draw_wheels(axes: Axes, times: Array, speeds: Array, solution: Solution) ->
             label=name,
         )
     axes.set_ylabel("wheel speed (rad/s)")
-    section, limit = solution.problem.actuator, solution.problem.limits.wheel_speed
-    same = section.enabled and section.saturation == limit
+    section, limit = solution.problem.actuator, _wheel_limit(solution)
+    same = section is not None and section.saturation == limit
     _limit_lines(axes, limit, "limit, saturation" if same else "limit", both=True)
-    if not section.enabled:
+    if section is None:
         return
     if section.dead_zone > 0:
         axes.axhspan(
@@ -165,6 +166,12 @@ def _draw_wheels(axes: Axes, times: Array, speeds: Array, solution: Solution) ->
             linewidth=1.2,
             label=f"saturation {section.saturation:g}" if sign > 0 else None,
         )
+
+
+def _wheel_limit(solution: Solution) -> float | None:
+    """The limit of all wheels; None where they have different ones, or none."""
+    found = [limit.largest for limit in solution.problem.limits if isinstance(limit, WheelSpeed)]
+    return found[0] if found and isinstance(found[0], float) else None
 
 
 def _draw_use(axes: Axes, trajectory: Trajectory) -> None:

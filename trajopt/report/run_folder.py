@@ -2,7 +2,9 @@
 
 ``problem.toml`` the problem as solved; ``summary.json`` the result in numbers; ``trajectory.csv``
 the motion over time; ``timing.csv`` the exact speed profile; ``history.csv`` and ``explored.npz``
-the search; ``validation.json`` and ``simulated.csv`` the check in physics.
+the search, where control points were searched; ``validation.json`` and ``simulated.csv`` the check
+in physics. It stands alone: robot and path are in problem.toml, and reading it back gives problem,
+path and trajectory to the last bit.
 """
 
 from __future__ import annotations
@@ -18,24 +20,28 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
-from trajopt.objectives.duration import DurationObjective
-from trajopt.objectives.terminal import TerminalObjective, swarm_engine, terminal_objective
+from trajopt.objectives.terminal import swarm_engine, terminal_objective
 from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
-from trajopt.pipeline import Solution
-from trajopt.problem.search import WHEELS, Problem, load_problem
+from trajopt.pipeline import Solution, with_details
+from trajopt.problem import Problem, load_problem
 from trajopt.provenance import commit, run_facts, versions
-from trajopt.report.files import as_toml, made_folder, read_json, write_json, write_text
+from trajopt.report.files import (
+    as_toml,
+    made_folder,
+    read_json,
+    write_json,
+    write_table,
+    write_text,
+)
+from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.terrain import Flat
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from trajopt.simulate.check import ValidationReport
 
 
-FORMAT = 1  # of the folder; a reader of another number refuses
+FORMAT = 2  # of the folder; a reader of another number refuses
 SAMPLE_TIME = 0.01  # s, largest step of trajectory.csv; chosen: 100 rows a second
 _OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png")
 _OF_A_SOLUTION = (
@@ -52,29 +58,40 @@ _OF_A_SOLUTION = (
 
 
 def write_solution(
-    solution: Solution, folder: str | FilePath, *, seed: int, command: str | None = None
+    solution: Solution,
+    folder: str | FilePath,
+    *,
+    seed: int,
+    command: str | None = None,
+    pictures: bool = False,
 ) -> FilePath:
     """Write a solution into ``folder`` (made if needed; an earlier run's files are replaced) and
     return it.
 
     ``summary.json`` comes last, so a folder with one is complete. Equal seeds and budgets in
     evaluations give equal bytes there outside the key "run". Without a trajectory there is no
-    trajectory.csv and timing.csv. Raises ArgumentError where the folder cannot be written.
+    trajectory.csv and timing.csv. ``pictures`` draws them too. Raises ArgumentError where the
+    folder cannot be written.
     """
-    place = made_folder(folder)
+    place, search = made_folder(folder), solution.search
     for name in (
         *_OF_A_SOLUTION,
         *_OF_A_CHECK,
     ):  # nothing of an earlier run may pass for this one's
         (place / name).unlink(missing_ok=True)
-    write_text(
-        place / "problem.toml", as_toml(solution.problem.model_dump(mode="json", exclude_none=True))
-    )
+    write_text(place / "problem.toml", as_toml(solution.problem.standalone()))
     if solution.trajectory is not None:
-        _write_csv(trajectory_table(solution), place / "trajectory.csv")
-        _write_csv(_timing_table(solution.trajectory), place / "timing.csv")
-    _write_csv(_history_table(solution.search.history), place / "history.csv")
-    _write_samples(solution.search.history.samples, place / "explored.npz")
+        write_table(place / "trajectory.csv", trajectory_table(solution.trajectory))
+        write_table(place / "timing.csv", _timing_table(solution.trajectory))
+    if search is not None:
+        write_table(place / "history.csv", _history_table(search.history))
+        _write_samples(search.history.samples, place / "explored.npz")
+    if solution.details is not None:
+        solution.details.save(place, pictures=pictures)
+    if pictures:
+        from trajopt.report.pictures import save_pictures
+
+        save_pictures(solution, place)
     summary = solution_summary(solution, seed=seed)
     summary["run"] = {
         **run_facts(),
@@ -82,7 +99,7 @@ def write_solution(
         "folder": str(place),
         "problem_file": solution.problem.source,
         "wall_time_s": solution.wall_time,
-        "search_time_s": solution.search.seconds,
+        "search_time_s": None if search is None else search.seconds,
     }
     write_json(place / "summary.json", summary)
     return place
@@ -90,54 +107,68 @@ def write_solution(
 
 def solution_summary(solution: Solution, *, seed: int) -> dict[str, Any]:
     """Everything about a solution that equal runs share; units in the names."""
-    search, trajectory = solution.search, solution.trajectory
-    terminal = _terminal(solution.objective)
+    trajectory, problem = solution.trajectory, solution.problem
+    points = [
+        dict(zip(("x_m", "y_m", "yaw_rad"), row, strict=True))
+        for row in solution.control_points.tolist()
+    ]
     return {
         "format": FORMAT,
-        "title": solution.problem.title,
+        "title": problem.title,
+        "job": problem.job.name,
+        "robot": problem.robot.name,
         "holds": solution.holds,
         "status": solution.status,
         "faults": list(solution.faults),
-        "objective": solution.problem.objective.kind,
         "cost": solution.cost,
         "terms": solution.terms,
-        "violation": search.violation,
         "duration_s": solution.duration,
         "margins": solution.margins,
         "binding_share_of_time": {} if trajectory is None else binding_shares(trajectory),
-        "decision": dict(zip(terminal.names, search.x.tolist(), strict=True)),
-        "control_points": [
-            dict(zip(("x_m", "y_m", "yaw_rad"), row, strict=True))
-            for row in solution.control_points.tolist()
-        ],
+        "control_points": points,
         "final_deviation": dict(
-            zip(("x_m", "y_m", "yaw_rad"), solution.deviation.tolist(), strict=True)
+            zip(("x_m", "y_m", "yaw_rad"), solution.deviation.tolist(), strict=False)
         ),
-        "final_wheel_deviation_rad": _by_wheel(solution.wheel_deviation),
-        "dead_zone_effect_rad": _by_wheel(solution.dead_zone_effect),
+        "final_wheel_deviation_rad": dict(
+            zip(problem.robot.wheel_names, solution.wheel_deviation.tolist(), strict=False)
+        ),
         "infeasible": _infeasible(solution.infeasible),
+        "refused": list(solution.refused),
         "timing": None
         if trajectory is None
         else {
             "engine": trajectory.engine,
             "gridpoints": len(trajectory.s),
             "slowdown": trajectory.slowdown,
+            "limits": [limit.name for limit in trajectory.limits],
         },
-        "search": {
-            "optimizer": search.optimizer,
-            "seed": int(seed),
-            "status": search.status.name,
-            "message": search.message,
-            "success": search.success,
-            "evaluations": search.nfev,
-            "iterations": search.nit,
-            "cost_on_search_grid": search.search_fun,
-            "failures": search.failures,
-            "first_failure": search.first_failure,
-        },
-        "swarm_engine": swarm_engine(),
+        "search": _search_summary(solution, seed),
+        "details": {} if solution.details is None else solution.details.notes,
         "versions": versions(),
         "commit": commit(),
+    }
+
+
+def _search_summary(solution: Solution, seed: int) -> dict[str, Any] | None:
+    search = solution.search
+    if search is None:
+        return None
+    names = terminal_objective(solution.problem).names
+    return {
+        "objective": solution.problem.objective.kind,
+        "decision": dict(zip(names, search.x.tolist(), strict=True)),
+        "violation": search.violation,
+        "optimizer": search.optimizer,
+        "seed": int(seed),
+        "status": search.status.name,
+        "message": search.message,
+        "success": search.success,
+        "evaluations": search.nfev,
+        "iterations": search.nit,
+        "cost_on_search_grid": search.search_fun,
+        "failures": search.failures,
+        "first_failure": search.first_failure,
+        "swarm_engine": swarm_engine(),
     }
 
 
@@ -155,32 +186,28 @@ def read_solution(folder: str | FilePath) -> Solution:
             str(place / "summary.json"), summary.get("format"), f"format = {FORMAT}"
         )
     problem = load_problem(place / "problem.toml")
-    if not isinstance(problem, Problem):
-        raise ArgumentError(
-            "folder", str(folder), "a folder with a problem that is searched, without [path]"
-        )
-    terminal = terminal_objective(problem)
-    objective = DurationObjective(terminal) if problem.objective.kind == "duration" else terminal
     try:
-        search = _search(summary, place, terminal.names)
-        path = objective.path(search.x)
+        search = None if summary["search"] is None else _search(summary, place, problem)
+        path = problem.path if problem.job.name == "path" else None
+        if search is not None:
+            path = terminal_objective(problem).path(search.x)
         timing = summary["timing"]
-        trajectory = None if timing is None else _trajectory(place, path, terminal, timing)
+        trajectory = None
+        if timing is not None and path is not None:
+            trajectory = _trajectory(place, path, problem, timing)
         failed = summary["infeasible"]
-        return Solution(
-            problem=problem,
-            objective=objective,
-            search=search,
-            terms={name: _number(value, np.inf) for name, value in summary["terms"].items()},
-            path=path,
-            trajectory=trajectory,
-            infeasible=None
-            if failed is None
-            else InfeasibleError(failed["limit"], failed["place_m"], failed["reason"]),
-            deviation=_numbers(summary["final_deviation"]),
-            wheel_deviation=_numbers(summary["final_wheel_deviation_rad"]),
-            dead_zone_effect=_numbers(summary["dead_zone_effect_rad"]),
-            wall_time=summary["run"]["wall_time_s"],
+        return with_details(
+            Solution(
+                problem,
+                path,
+                trajectory,
+                None
+                if failed is None
+                else InfeasibleError(failed["limit"], failed["place_m"], failed["reason"]),
+                search,
+                tuple(summary["refused"]),
+                wall_time=summary["run"]["wall_time_s"],
+            )
         )
     except (KeyError, TypeError, AttributeError) as error:
         raise ArgumentError(
@@ -190,9 +217,9 @@ def read_solution(folder: str | FilePath) -> Solution:
         ) from None
 
 
-def write_validation(report: ValidationReport, folder: str | FilePath) -> FilePath:
-    """Write a check in physics into ``folder``: validation.json and simulated.csv. Returns the
-    folder.
+def write_validation(report: ValidationReport, folder: str | FilePath, robot: Robot) -> FilePath:
+    """Write a check in physics of ``robot`` into ``folder``: validation.json and simulated.csv.
+    Returns the folder.
 
     Raises ArgumentError where the folder cannot be written.
     """
@@ -203,11 +230,11 @@ def write_validation(report: ValidationReport, folder: str | FilePath) -> FilePa
     for prefix, pose in (("planned_", report.planned), ("", recording.pose)):
         for i, name in enumerate(("x_m", "y_m", "yaw_rad")):
             columns[prefix + name] = pose[:, i]
-    columns |= wheel_columns("angle_rad", recording.wheel_angles)
-    columns |= wheel_columns("speed_rad_s", recording.wheel_speeds)
-    columns |= wheel_columns("torque_nm", recording.wheel_torques)
-    _write_csv(_frame({"t_s": recording.times, **columns}), place / "simulated.csv")
-    summary = validation_summary(report)
+    columns |= wheel_columns("angle_rad", recording.wheel_angles, robot)
+    columns |= wheel_columns("speed_rad_s", recording.wheel_speeds, robot)
+    columns |= wheel_columns("torque_nm", recording.wheel_torques, robot)
+    write_table(place / "simulated.csv", {"t_s": recording.times, **columns})
+    summary = validation_summary(report, robot)
     summary["run"] = {
         **run_facts(),
         "real_time_factor": report.real_time_factor,
@@ -217,7 +244,7 @@ def write_validation(report: ValidationReport, folder: str | FilePath) -> FilePa
     return place
 
 
-def validation_summary(report: ValidationReport) -> dict[str, Any]:
+def validation_summary(report: ValidationReport, robot: Robot) -> dict[str, Any]:
     """A check in physics in numbers; units in the names, shares relative to the path's length."""
     length = report.length if report.length > 0 else np.nan
     return {
@@ -233,7 +260,9 @@ def validation_summary(report: ValidationReport) -> dict[str, Any]:
         "across_share": report.across / length,
         "final_distance_m": report.final_distance,
         "yaw_rad": report.yaw,
-        "wheel_deviation_rad": _by_wheel(report.wheel_deviation),
+        "wheel_deviation_rad": dict(
+            zip(robot.wheel_names, report.wheel_deviation.tolist(), strict=True)
+        ),
         "path_rms_m": report.path_rms,
         "path_max_m": report.path_max,
         "versions": versions(),
@@ -241,30 +270,24 @@ def validation_summary(report: ValidationReport) -> dict[str, Any]:
     }
 
 
-def trajectory_table(solution: Solution) -> pd.DataFrame:
-    """The motion in equal steps of at most 10 ms; units in the column names.
+def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
+    """The motion in equal steps of at most 10 ms, a column a name; units in the names.
 
-    Pose in the world; speeds in the body frame; wheel angles as the goal states them, from
-    ``start.wheels`` on; ``limit`` names what binds ("" for nothing). Raises ArgumentError for a
-    solution without a trajectory.
+    Pose in the world; speeds in the body frame; wheel angles from the trajectory's ``start_wheels``
+    on; ``limit`` names what binds ("" for nothing).
     """
-    trajectory = solution.trajectory
-    if trajectory is None:
-        raise ArgumentError("solution", solution.status, "a solution with a trajectory")
-    times = np.linspace(
-        0.0, trajectory.duration, max(2, int(np.ceil(trajectory.duration / SAMPLE_TIME)) + 1)
-    )
+    count = max(2, int(np.ceil(trajectory.duration / SAMPLE_TIME)) + 1)
+    times = np.linspace(0.0, trajectory.duration, count)
     state, (s, speed, acceleration) = trajectory.at(times), trajectory.along(times)
     columns: dict[str, Any] = {"t_s": times}
     columns |= dict(zip(("x_m", "y_m", "yaw_rad"), state.pose.T, strict=True))
     columns |= dict(zip(("vx_m_s", "vy_m_s", "yaw_rate_rad_s"), state.twist.T, strict=True))
-    columns |= wheel_columns(
-        "angle_rad", np.asarray(solution.problem.start.wheels) + state.wheel_angles
-    )
-    columns |= wheel_columns("speed_rad_s", state.wheel_speeds)
+    if trajectory.robot is not None:
+        columns |= wheel_columns("angle_rad", state.wheel_angles, trajectory.robot)
+        columns |= wheel_columns("speed_rad_s", state.wheel_speeds, trajectory.robot)
     columns |= {"s_m": s, "s_dot_m_s": speed, "s_ddot_m_s2": acceleration}
     columns["limit"] = binding_at(trajectory, times)
-    return _frame(columns)
+    return columns
 
 
 def binding_at(trajectory: Trajectory, times: Array) -> list[str]:
@@ -282,23 +305,12 @@ def binding_shares(trajectory: Trajectory) -> dict[str, float]:
     return dict(sorted(((k, v) for k, v in shares.items() if v > 0), key=lambda item: -item[1]))
 
 
-def wheel_columns(quantity: str, values: Array) -> dict[str, Array]:
+def wheel_columns(quantity: str, values: Array, robot: Robot) -> dict[str, Array]:
     """Columns wheel_<name>_<quantity> of an array (N, W)."""
     return {
         f"wheel_{name.replace('-', '_')}_{quantity}": values[:, i]
-        for i, name in enumerate(wheel_names(values.shape[1]))
+        for i, name in enumerate(robot.wheel_names)
     }
-
-
-def wheel_names(count: int) -> tuple[str, ...]:
-    """Names in wheel order: the four corners, or numbers from 1 for another number of wheels."""
-    return WHEELS if count == len(WHEELS) else tuple(str(i + 1) for i in range(count))
-
-
-def _by_wheel(values: Array) -> dict[str, float]:
-    return dict(
-        zip(wheel_names(len(values)), np.asarray(values, dtype=float).tolist(), strict=True)
-    )
 
 
 def _infeasible(error: InfeasibleError | None) -> dict[str, Any] | None:
@@ -309,58 +321,50 @@ def _infeasible(error: InfeasibleError | None) -> dict[str, Any] | None:
     )
 
 
-def _terminal(objective: TerminalObjective | DurationObjective) -> TerminalObjective:
-    return objective.terminal if isinstance(objective, DurationObjective) else objective
-
-
-def _timing_table(trajectory: Trajectory) -> pd.DataFrame:
+def _timing_table(trajectory: Trajectory) -> dict[str, Array]:
     """Gridpoints of the speed profile; s'' belongs to the interval after a gridpoint, so the last
     has none."""
-    if not isinstance(trajectory.ground, Flat):
-        raise ArgumentError(
-            "trajectory.ground", trajectory.ground, "flat ground: the folder keeps no other"
-        )
-    return _frame(
-        {
-            "u": trajectory.u,
-            "s_m": trajectory.s,
-            "s_dot_m_s": trajectory.sd,
-            "s_ddot_m_s2": np.append(trajectory.sdd, np.nan),
-        }
-    )
+    return {
+        "u": trajectory.u,
+        "s_m": trajectory.s,
+        "s_dot_m_s": trajectory.sd,
+        "s_ddot_m_s2": np.append(trajectory.sdd, np.nan),
+    }
 
 
 def _trajectory(
-    place: FilePath, path: Path, terminal: TerminalObjective, timing: dict[str, Any]
+    place: FilePath, path: Path, problem: Problem, timing: dict[str, Any]
 ) -> Trajectory:
     table = _read_csv(place / "timing.csv", ("u", "s_m", "s_dot_m_s", "s_ddot_m_s2"))
+    known = {limit.name: limit for limit in problem.limits}
+    if problem.profile is not None:
+        known[problem.profile.bound.name] = problem.profile.bound
     return Trajectory(
         path,
-        terminal.problem.limits.as_limits(),
-        terminal.robot,
-        Flat(),
+        tuple(known[name] for name in timing["limits"]),
+        problem.robot,
+        problem.scene.ground,
         table["u"],
         table["s_m"],
         table["s_dot_m_s"],
         table["s_ddot_m_s2"][:-1],
         timing["engine"],
         timing["slowdown"],
+        problem.start_wheels,
     )
 
 
-def _history_table(history: History) -> pd.DataFrame:
-    return _frame(
-        {
-            "evaluations": history.evaluations,
-            "cost": history.cost,
-            "violation": history.violation,
-            "seconds_s": history.seconds,
-        }
-    )
+def _history_table(history: History) -> dict[str, Any]:
+    return {
+        "evaluations": history.evaluations,
+        "cost": history.cost,
+        "violation": history.violation,
+        "seconds_s": history.seconds,
+    }
 
 
-def _search(summary: dict[str, Any], place: FilePath, names: tuple[str, ...]) -> OptimizeResult:
-    facts = summary["search"]
+def _search(summary: dict[str, Any], place: FilePath, problem: Problem) -> OptimizeResult:
+    facts, names = summary["search"], terminal_objective(problem).names
     table = _read_csv(place / "history.csv", ("evaluations", "cost", "violation", "seconds_s"))
     try:
         with np.load(place / "explored.npz") as stored:
@@ -377,9 +381,9 @@ def _search(summary: dict[str, Any], place: FilePath, names: tuple[str, ...]) ->
         samples,
     )
     return OptimizeResult(
-        x=np.array([summary["decision"][name] for name in names], dtype=np.float64),
+        x=np.array([facts["decision"][name] for name in names], dtype=np.float64),
         fun=_number(summary["cost"], np.inf),
-        violation=_number(summary["violation"], np.inf),
+        violation=_number(facts["violation"], np.inf),
         search_fun=_number(facts["cost_on_search_grid"], np.inf),
         nfev=facts["evaluations"],
         nit=facts["iterations"],
@@ -396,20 +400,6 @@ def _search(summary: dict[str, Any], place: FilePath, names: tuple[str, ...]) ->
 
 def _number(value: float | None, missing: float) -> float:
     return missing if value is None else float(value)
-
-
-def _numbers(values: dict[str, float | None]) -> Array:
-    return np.array([_number(v, np.nan) for v in values.values()])
-
-
-def _frame(columns: dict[str, Any]) -> pd.DataFrame:
-    import pandas as pd
-
-    return pd.DataFrame(columns)
-
-
-def _write_csv(table: pd.DataFrame, file: FilePath) -> None:
-    write_text(file, table.to_csv(index=False, lineterminator="\n"))
 
 
 def _read_csv(file: FilePath, columns: tuple[str, ...]) -> dict[str, Array]:

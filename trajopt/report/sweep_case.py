@@ -124,7 +124,7 @@ def _solved_again(
     write_solution(solution, place, seed=seed_of(case), command="trajopt report")
     files = [place / "summary.json", *save_pictures(solution, place)]
     if report is not None:
-        write_validation(report, place)
+        write_validation(report, place, solution.problem.robot)
         files += save_physics_picture(solution, report, place)
     return files
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from trajopt.optimize.base import OptimizeResult
 from trajopt.pipeline import Solution
-from trajopt.report.run_folder import binding_shares, wheel_names
+from trajopt.report.run_folder import binding_shares
+from trajopt.robots.robot import Robot
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
@@ -20,6 +22,27 @@ def solution_table(solution: Solution) -> Table:
     """Cost with its terms, duration, margins with the limit that binds, evaluations, status."""
     search = solution.search
     table = _table(solution.problem.title)
+    if search is not None:
+        _search_rows(table, solution, search)
+    if solution.path is not None:
+        table.add_row("path length", f"{solution.path.length:.3f} m")
+    table.add_row(
+        "duration", "none" if solution.trajectory is None else f"{solution.duration:.4f} s"
+    )
+    _margin_rows(table, solution)
+    for name, facts in ({} if solution.details is None else solution.details.notes).items():
+        table.add_row(name.replace("_", " "), escape(_facts(facts)))
+    if search is not None:
+        failed = f", {search.failures} failed" if search.failures else ""
+        table.add_row("optimizer", escape(search.optimizer))
+        table.add_row("evaluations", f"{search.nfev}{failed}, {search.nit} iterations")
+    table.add_row("time taken", f"{solution.wall_time:.2f} s")
+    verdict = "[green]holds[/green]" if solution.holds else "[red]does not hold[/red]"
+    table.add_row("status", f"{verdict}: {escape(solution.status)}")
+    return table
+
+
+def _search_rows(table: Table, solution: Solution, search: OptimizeResult) -> None:
     unit = " s" if solution.problem.objective.kind == "duration" else ""
     table.add_row("cost", f"{_number(solution.cost)}{unit}")
     if len(solution.terms) > 1:
@@ -29,30 +52,16 @@ def solution_table(solution: Solution) -> Table:
         table.add_row("violation", _number(search.violation))
     for i, point in enumerate(solution.control_points[1:-1], start=1):
         table.add_row(f"P{i}", f"({point[0]:.4f}, {point[1]:.4f}) m, yaw {point[2]:.4f} rad")
-    table.add_row(
-        "duration", "none" if solution.trajectory is None else f"{solution.duration:.4f} s"
-    )
-    _margin_rows(table, solution)
-    for name, value in zip(
-        wheel_names(len(solution.dead_zone_effect)), solution.dead_zone_effect, strict=True
-    ):
-        drives = solution.problem.actuator
-        if drives.dead_zone > 0 and not drives.enabled and name in solution.problem.goal.critical:
-            table.add_row(
-                f"dead-zone would add, {name}",
-                f"{value:+.4f} rad" if np.isfinite(value) else "none",
-            )
-    table.add_row("optimizer", escape(search.optimizer))
-    failed = f", {search.failures} failed" if search.failures else ""
-    table.add_row(
-        "evaluations", f"{search.nfev}{failed}, {search.nit} iterations, {solution.wall_time:.2f} s"
-    )
-    verdict = "[green]holds[/green]" if solution.holds else "[red]does not hold[/red]"
-    table.add_row("status", f"{verdict}: {escape(search.message)}")
-    return table
 
 
-def validation_table(report: ValidationReport) -> Table:
+def _facts(facts: Any) -> str:
+    """Nested facts in one line."""
+    if isinstance(facts, dict):
+        return ", ".join(f"{name} {_facts(value)}" for name, value in facts.items())
+    return f"{facts:.4g}" if isinstance(facts, float) else str(facts)
+
+
+def validation_table(report: ValidationReport, robot: Robot) -> Table:
     """Deviations of the simulated from the planned motion."""
     feedback = "" if report.control is None else f", {report.control}, seed {report.seed}"
     table = _table(f"Check in {report.engine} {report.recording.version}{feedback}")
@@ -68,9 +77,7 @@ def validation_table(report: ValidationReport) -> Table:
     table.add_row(
         "off the path", f"rms {1e3 * report.path_rms:.2f} mm, most {1e3 * report.path_max:.2f} mm"
     )
-    for name, value in zip(
-        wheel_names(len(report.wheel_deviation)), report.wheel_deviation, strict=True
-    ):
+    for name, value in zip(robot.wheel_names, report.wheel_deviation, strict=True):
         table.add_row(f"wheel {name}", f"{1e3 * value:+.3f} mrad")
     table.add_row("real-time factor", f"{report.real_time_factor:.2f}")
     return table

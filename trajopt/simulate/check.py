@@ -9,8 +9,8 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.control.approach import Mode, approach_controller
 from trajopt.errors import ArgumentError, SimulationError
-from trajopt.problem.search import Problem
-from trajopt.robots.robot import robot as shipped
+from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.problem import Problem
 from trajopt.simulate.engine import Camera, Command, Controller, Recording, make_engine
 from trajopt.simulate.scene import Scene
 from trajopt.systems.smdw.approach_run import SETTLE, steered
@@ -84,28 +84,23 @@ def drive_trajectory(
         if np.allclose(state.wheel_speeds[-1], 0)
         else np.vstack([state.wheel_speeds[:-1], np.zeros((2, 4))]),
         _triple(state.pose[0]),
-        _four(problem.start.wheels),
+        _four(trajectory.start_wheels),
     )
     recording = _run(engine, problem, command, picture, None)
     plan = trajectory.at(np.minimum(recording.times, trajectory.duration))
-    return _compared(
-        plan.pose,
-        np.asarray(problem.start.wheels) + plan.wheel_angles[-1],
-        recording,
-        trajectory.duration,
-    )
+    return _compared(plan.pose, plan.wheel_angles[-1], recording, trajectory.duration)
 
 
 def _controlled(
     trajectory: Trajectory, problem: Problem, engine: str, picture: bool, control: Mode, seed: int
 ) -> ValidationReport:
-    start = np.asarray(problem.start.wheels, dtype=np.float64)
+    cap = next((limit.largest for limit in problem.limits if isinstance(limit, WheelSpeed)), np.inf)
     controller = approach_controller(
         trajectory,
-        shipped(problem.robot.name),
-        start,
-        problem.goal.critical_indices,
-        cap=problem.limits.wheel_speed or np.inf,
+        problem.robot,
+        trajectory.start_wheels,
+        problem.critical_indices,
+        cap=float(np.min(cap)),
         mode=control,
         rng=np.random.default_rng(seed),
     )
@@ -114,7 +109,7 @@ def _controlled(
         np.array([0.0, reference.times[-1] + SETTLE]),
         np.zeros((2, 4)),
         _triple(reference.pose[0]),
-        _four(problem.start.wheels),
+        _four(trajectory.start_wheels),
     )
     recording = _run(engine, problem, command, picture, steered(controller))
     planned = np.column_stack(
@@ -128,8 +123,8 @@ def _run(
     engine: str, problem: Problem, command: Command, picture: bool, controller: Controller | None
 ) -> Recording:
     recording = make_engine(engine).run(
-        roller_robot(shipped("loc8")),
-        Scene(problem.scene.friction),
+        roller_robot(problem.robot),
+        Scene(problem.ground.friction),
         command,
         controller=controller,
         picture=Camera() if picture else None,
@@ -165,8 +160,9 @@ def _triple(values: Array) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _four(values: tuple[float, ...]) -> tuple[float, float, float, float]:
-    return values[0], values[1], values[2], values[3]
+def _four(values: Array) -> tuple[float, float, float, float]:
+    a, b, c, d = values.tolist()
+    return a, b, c, d
 
 
 def _final_direction(poses: Array) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.paths.path import Path
+from trajopt.world.crossing import Standing
 
 FINE_STEPS = 360  # steps along a path when it is checked, chosen: 6 mm on a 2 m path
 
@@ -59,7 +60,7 @@ class FreeGround:
         return f"the footprint crosses {where} by {-rooms[worst]:.3g} m"
 
 
-def path_margin(path: Path, ground: FreeGround, steps: int = FINE_STEPS) -> float:
+def path_margin(path: Path, ground: FreeGround | Standing, steps: int = FINE_STEPS) -> float:
     """Least distance (m) of the footprint from any border along a path; negative where it crosses
     one."""
     u = np.linspace(path.start, path.end, steps + 1)

@@ -12,7 +12,7 @@ import pytest
 from trajopt.errors import InfeasibleError, ProblemError
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
-from trajopt.problem.given_path import PathProblem, load_path_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.constants import FRICTION
 from trajopt.systems.powerbot.identify import (
@@ -40,8 +40,8 @@ def printed() -> dict[int, dict[str, float]]:
         return {int(r["experiment"]): {k: float(v) for k, v in r.items() if v} for r in rows}
 
 
-def problem(number: int) -> PathProblem:
-    return load_path_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
+def problem(number: int) -> Problem:
+    return load_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
 
 
 def test_worked_spline_of_appendix_1() -> None:
@@ -115,10 +115,10 @@ def test_time_optimal_beats_linear(number: int, ratio: float) -> None:
     task = problem(number)
     times = [
         time_scale(
-            task.spline,
-            task.as_limits(variant="thesis"),
-            robot=task.platform,
-            ground=task.terrain,
+            task.path,
+            task.replace({"limits.variant": "thesis"}).limits,
+            robot=task.robot,
+            ground=task.scene.ground,
             engine=engine,
         )
         for engine in ("linear", "auto")
@@ -135,9 +135,13 @@ def test_thesis_braking_downhill_is_unsafe() -> None:
         Path.through([[0, 0], [8, 0]]),
         [Ramp((0.5, 0.0), 0.0, 4.266, -0.45, 0.35), Ramp((4.766, 0.0), 0.0, 4.266, -0.45, 0.35)],
     )
-    thesis = time_scale(down, task.as_limits(variant="thesis"), robot=shipped("powerbot"))
-    rows = task.as_limits(variant="physical")[-2].rows(
-        sample_path(down, thesis.s[:-1]), shipped("powerbot")
+    thesis = time_scale(
+        down, task.replace({"limits.variant": "thesis"}).limits, robot=shipped("powerbot")
+    )
+    rows = (
+        task.replace({"limits.variant": None})
+        .limits[-2]
+        .rows(sample_path(down, thesis.s[:-1]), shipped("powerbot"))
     )
     used = rows.a * thesis.sdd[:, None] + rows.b * thesis.sd[:-1, None] ** 2
     assert np.any(used > rows.c * 1.0 + 0.05)
@@ -148,19 +152,18 @@ def test_slope_beyond_the_grade_is_refused() -> None:
         ramps=[{"foot": [-44.63, -30.4], "direction": -1.588, "length": 4.29, "height": 0.9}]
     )
     with pytest.raises(InfeasibleError, match="grade"):
-        time_scale(task.spline, task.as_limits(), robot=task.platform, ground=task.terrain)
+        time_scale(task.path, task.limits, robot=task.robot, ground=task.scene.ground)
 
 
 def test_ramp_keeps_the_curve_in_the_plane() -> None:
     task = problem(4)
-    u = np.linspace(task.spline.start, task.spline.end, 500)
-    over, flat = task.spline.position(u), task.flat_path.position(u)
+    u = np.linspace(task.path.start, task.path.end, 500)
+    over, flat = task.path.position(u), task.flat_path.position(u)
     assert over[:, :2] == pytest.approx(flat[:, :2], abs=1e-10)
     assert over[-1, 2] == pytest.approx(0.45, abs=1e-6)
-    assert over[:, 2] == pytest.approx(task.terrain.height(over[:, 0], over[:, 1]), abs=3e-3)
+    assert over[:, 2] == pytest.approx(task.scene.ground.height(over[:, 0], over[:, 1]), abs=3e-3)
     assert (
-        np.degrees(sample_path(task.spline, np.linspace(0, task.spline.length, 500)).slope).max()
-        < 6.3
+        np.degrees(sample_path(task.path, np.linspace(0, task.path.length, 500)).slope).max() < 6.3
     )
 
 
@@ -190,14 +193,12 @@ def test_dotted_keys_replace_and_override_as_in_other_problem_files() -> None:
     assert task.replace({"limits.friction": None}).limits.friction is None
     assert task.replace(limits={"friction": 0.4}).limits.speed == task.limits.speed
     file = ROOT / "problems" / "powerbot" / "experiment_4.toml"
-    assert load_path_problem(file, {"limits.friction": 0.5}) == task.replace(
-        {"limits.friction": 0.5}
-    )
+    assert load_problem(file, {"limits.friction": 0.5}) == task.replace({"limits.friction": 0.5})
     for wrong in ("limits.frction", "limits.friction.deep"):
         with pytest.raises(ProblemError, match=wrong):
             task.replace({wrong: 1.0})
         with pytest.raises(ProblemError, match=wrong):
-            load_path_problem(file, {wrong: 1.0})
+            load_problem(file, {wrong: 1.0})
 
 
 def test_friction_of_appendix_2() -> None:

@@ -20,7 +20,7 @@ from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path
-from trajopt.problem.given_path import PathProblem, load_path_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.refine.profile import follow
 from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.differential import Floor, Wall, drive_in_pybullet
@@ -123,12 +123,14 @@ def test_closed_loop_through_a_door() -> None:
     assert crash.touched
 
 
-def problem(number: int) -> PathProblem:
-    return load_path_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
+def problem(number: int) -> Problem:
+    return load_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
 
 
-def with_friction(task: PathProblem, share: float) -> list[Limit]:
-    kept = [x for x in task.as_limits(variant="physical") if x.name not in ("slip", "tip")]
+def with_friction(task: Problem, share: float) -> list[Limit]:
+    kept = [
+        x for x in task.replace({"limits.variant": None}).limits if x.name not in ("slip", "tip")
+    ]
     return [*kept, Slip(share * task.friction, per_wheel=True)]
 
 
@@ -186,7 +188,7 @@ def test_experiment_3_among_its_obstacles(kind: str) -> None:
     task = problem(3)
     assert [(o.appears, o.clears_after) for o in task.obstacles] == [(9.95, 0.59), (21.2, 2.74)]
     where = course(
-        time_scale(task.spline, with_friction(task, 0.5), robot=ROBOT),
+        time_scale(task.path, with_friction(task, 0.5), robot=ROBOT),
         ROBOT,
         limits=with_friction(task, 0.8),
     )
@@ -225,7 +227,7 @@ def test_experiment_6_along_its_profile(manner: Literal["below", "least_squares"
     task = problem(6)
     profile = task.speed_profile()
     assert profile is not None
-    plan = follow(task.spline, profile, with_friction(task, 0.7), robot=ROBOT, manner=manner)
+    plan = follow(task.path, profile, with_friction(task, 0.7), robot=ROBOT, manner=manner)
     seen = drive_in_pybullet(
         plan.trajectory, powerbot_drive(ROBOT), Floor(task.friction), tracker=Tracker()
     )

@@ -12,10 +12,10 @@ from trajopt.control.approach import Estimate, Sensors, approach_controller, cor
 from trajopt.control.bend import ROOM, ROOM_WEIGHT, Goal, reference_of, resolved, wheel_path
 from trajopt.errors import ArgumentError
 from trajopt.paths.path import Path as RobotPath
-from trajopt.problem.search import WHEELS
+from trajopt.problem import load_problem
 from trajopt.systems.smdw.climbing import loc8_smdw
-from trajopt.systems.smdw.planner import Plan, configurations, plan_configuration
-from trajopt.systems.smdw.problem import load_maneuver
+from trajopt.systems.smdw.entry import WHEELS, free_ground
+from trajopt.systems.smdw.planner import Plan, configurations_of, plan_configuration
 from trajopt.timing.scaling import time_scale
 
 FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"
@@ -24,8 +24,8 @@ ROBOT = loc8_smdw()
 
 @pytest.fixture(scope="module")
 def plan() -> Plan:
-    problem = load_maneuver(FILE)
-    found = plan_configuration(problem, configurations(problem.robot.wheel, problem.obstacle)[0])
+    problem = load_problem(FILE)
+    found = plan_configuration(problem, configurations_of(problem)[0])
     assert isinstance(found, Plan)
     return found
 
@@ -171,15 +171,11 @@ def test_bends_leave_the_present_speed_as_it_is(plan: Plan) -> None:
 
 def test_a_bent_path_keeps_its_room_where_the_free_bend_would_cross_the_step() -> None:
     """Phase errors that free bends answer with a detour, some of them through the step."""
-    problem = load_maneuver(FILE.with_name("step_3_5cm.toml"))
-    found = next(
-        c
-        for c in configurations(problem.robot.wheel, problem.obstacle)
-        if c.name == "forward -35 deg"
-    )
+    problem = load_problem(FILE.with_name("step_3_5cm.toml"))
+    found = next(c for c in configurations_of(problem) if c.name == "forward -35 deg")
     plan = plan_configuration(problem, found)
     assert isinstance(plan, Plan)
-    reference, ground = reference_of(plan.trajectory, np.zeros(4)), problem.free_ground
+    reference, ground = reference_of(plan.trajectory, np.zeros(4)), free_ground(problem)
     goal = Goal(reference.pose[-1], reference.wheels[-1], critical(plan), 30.0, ground)
     when = 0.6 * plan.duration
     rooms = []
@@ -256,7 +252,7 @@ def test_an_error_at_rest_is_shared_between_pose_and_phase_on_the_spot(plan: Pla
 
 def test_too_little_turn_is_refused() -> None:
     path = RobotPath.through([[0, 0], [1, 0], [2, 0]], heading=[0.0, 0.1, 0.2])
-    trajectory = time_scale(path, load_maneuver(FILE).limits.as_limits(), robot=ROBOT)
+    trajectory = time_scale(path, load_problem(FILE).limits, robot=ROBOT)
     with pytest.raises(ArgumentError, match="30 deg of turn"):
         approach_controller(
             trajectory, ROBOT, np.zeros(4), (0, 2), cap=30.0, rng=np.random.default_rng(0)

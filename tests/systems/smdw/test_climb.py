@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from trajopt.errors import ArgumentError
-from trajopt.problem.search import WHEELS
+from trajopt.problem import load_problem
 from trajopt.simulate.engine import Recording
 from trajopt.systems.smdw.climb import (
     Climb,
@@ -20,8 +20,13 @@ from trajopt.systems.smdw.climb import (
     rate,
     run_climb,
 )
-from trajopt.systems.smdw.planner import Plan, configurations, plan_configuration
-from trajopt.systems.smdw.problem import load_maneuver
+from trajopt.systems.smdw.entry import WHEELS
+from trajopt.systems.smdw.planner import (
+    Plan,
+    configurations_of,
+    plan_configuration,
+    wheel_of,
+)
 
 FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"
 STEP = StepScene(0.05, (2.856, 0.76), 0.0, 0.8, 8.0, 0.047, 0.045, 0.03)
@@ -119,19 +124,19 @@ def test_exploded_runs_are_counted_and_left_out() -> None:
 
 def test_planner_and_simulator_agree_on_the_wheel() -> None:
     """The robot that physics climbs with has the problem's sizes and wheel places."""
-    problem = load_maneuver(FILE)
-    wheel, robot = problem.robot.wheel, STEP.robot()
+    problem = load_problem(FILE)
+    wheel, robot = wheel_of(problem), STEP.robot()
     assert robot.wheels[0].radius == wheel.radius
     beyond = (robot.wheels[0].width - wheel.width) / 2  # rollers stand out of the hubs' faces
     assert 0 <= beyond < problem.approach.gap / 3
-    places = [(w.l * math.cos(w.alpha), w.l * math.sin(w.alpha)) for w in problem.platform.wheels]
+    places = [(w.l * math.cos(w.alpha), w.l * math.sin(w.alpha)) for w in problem.robot.wheels]
     assert np.array(robot.wheel_positions) == pytest.approx(np.array(places), abs=1e-12)
 
 
 def test_planned_lateral_climb_gets_up_and_a_wall_does_not() -> None:
     pytest.importorskip("mujoco")
-    problem = load_maneuver(FILE)
-    plan = plan_configuration(problem, configurations(problem.robot.wheel, problem.obstacle)[0])
+    problem = load_problem(FILE)
+    plan = plan_configuration(problem, configurations_of(problem)[0])
     assert isinstance(plan, Plan)
     a, b, c, d = plan.target.wheels
     i, j = (WHEELS.index(w) for w in plan.configuration.critical)

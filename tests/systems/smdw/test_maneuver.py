@@ -12,18 +12,20 @@ from trajopt.errors import ArgumentError, ProblemError
 from trajopt.objectives.clearance import ClearObjective
 from trajopt.objectives.terminal import TerminalObjective
 from trajopt.optimize.search import minimize
-from trajopt.problem.search import WHEELS, load_problem
+from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.climbing import Motion, collision_reach
+from trajopt.systems.smdw.entry import WHEELS, free_ground, step_of
 from trajopt.systems.smdw.planner import (
     Maneuver,
     Plan,
     Refused,
     approach_target,
     configurations,
+    configurations_of,
     plan_climb,
     plan_configuration,
+    wheel_of,
 )
-from trajopt.systems.smdw.problem import ManeuverProblem, load_maneuver
 from trajopt.world.free_ground import FreeGround, path_margin
 
 PROBLEMS = Path(__file__).parents[3] / "problems" / "smdw"
@@ -32,7 +34,7 @@ FILES = ("step_5cm.toml", "step_3_5cm.toml")
 
 @pytest.fixture(scope="module", params=FILES)
 def maneuver(request: pytest.FixtureRequest) -> Maneuver:
-    return plan_climb(load_maneuver(PROBLEMS / request.param))
+    return plan_climb(load_problem(PROBLEMS / request.param))
 
 
 def test_the_theses_three_configurations_have_plans(maneuver: Maneuver) -> None:
@@ -65,8 +67,8 @@ def test_final_wheel_angles_are_exact_by_plain_quadrature(maneuver: Maneuver) ->
 
 
 def test_footprint_stays_on_free_ground(maneuver: Maneuver) -> None:
-    ground = maneuver.problem.free_ground
-    edge = maneuver.problem.obstacle.place[0]
+    ground = free_ground(maneuver.problem)
+    edge = step_of(maneuver.problem).place[0]
     for plan in maneuver.plans:
         state = plan.trajectory.at(np.linspace(0, plan.duration, 1500))
         corners = np.array(ground.footprint)
@@ -89,7 +91,7 @@ def test_rolling_on_from_the_target_meets_the_step_in_the_middle_of_the_window(
     for plan in maneuver.plans:
         c, target = plan.configuration, plan.target
         x, y, yaw = target.pose
-        spin = np.sign(problem.platform.inverse @ [*c.direction, 0.0])
+        spin = np.sign(problem.robot.inverse @ [*c.direction, 0.0])
         places = {
             "front-left": (0.376, 0.316),
             "front-right": (0.376, -0.316),
@@ -106,9 +108,9 @@ def test_rolling_on_from_the_target_meets_the_step_in_the_middle_of_the_window(
             wx, wy = places[name]
             along = math.cos(yaw) * wx - math.sin(yaw) * wy
             reach = collision_reach(
-                problem.robot.wheel, c.window.middle, c.motion, c.alpha, problem.obstacle.height
+                wheel_of(problem), c.window.middle, c.motion, c.alpha, step_of(problem).height
             )
-            assert px + along + reach == pytest.approx(problem.obstacle.place[0], abs=1e-9)
+            assert px + along + reach == pytest.approx(step_of(problem).place[0], abs=1e-9)
             met.append(py + math.sin(yaw) * wx + math.cos(yaw) * wy)
             phase = spin[i] * target.wheels[i] + travel / 0.098
             beyond = (phase - c.window.middle) / math.pi
@@ -116,25 +118,25 @@ def test_rolling_on_from_the_target_meets_the_step_in_the_middle_of_the_window(
             outer_faces_step = name.endswith("left") == c.faces_left
             assert round(beyond) % 2 == (0 if outer_faces_step else 1)
         place = np.mean(met) if c.motion.lateral else met[0]
-        assert place == pytest.approx(problem.obstacle.place[1], abs=1e-9)
+        assert place == pytest.approx(step_of(problem).place[1], abs=1e-9)
 
 
 def test_turns_stay_within_a_quarter() -> None:
-    problem = load_maneuver(PROBLEMS / FILES[0])
+    problem = load_problem(PROBLEMS / FILES[0])
     for start in (-1.0, 0.0, 0.7):
-        found = configurations(problem.robot.wheel, problem.obstacle, start)
+        found = configurations(wheel_of(problem), step_of(problem), start)
         assert found
         assert all(abs(c.yaw - start) <= math.pi / 2 + 1e-9 for c in found)
-    assert {c.motion for c in configurations(problem.robot.wheel, problem.obstacle, 1.0)} >= {
+    assert {c.motion for c in configurations(wheel_of(problem), step_of(problem), 1.0)} >= {
         Motion.RIGHT
     }
     assert Motion.LEFT not in {
-        c.motion for c in configurations(problem.robot.wheel, problem.obstacle, 1.0)
+        c.motion for c in configurations(wheel_of(problem), step_of(problem), 1.0)
     }
 
 
 def test_a_step_turned_in_the_world_turns_the_plans() -> None:
-    straight = load_maneuver(PROBLEMS / FILES[0])
+    straight = load_problem(PROBLEMS / FILES[0])
     turned = straight.replace(
         {
             "obstacle.direction": math.pi / 2,
@@ -145,8 +147,8 @@ def test_a_step_turned_in_the_world_turns_the_plans() -> None:
         }
     )
     for a, b in zip(
-        configurations(straight.robot.wheel, straight.obstacle),
-        configurations(turned.robot.wheel, turned.obstacle, math.pi / 2),
+        configurations_of(straight),
+        configurations(wheel_of(turned), step_of(turned), math.pi / 2),
         strict=True,
     ):
         first, second = approach_target(straight, a), approach_target(turned, b)
@@ -159,11 +161,11 @@ def test_a_step_turned_in_the_world_turns_the_plans() -> None:
     assert [p.duration for p in b.plans] == pytest.approx([p.duration for p in a.plans], rel=0.1)
 
 
-def left_plan(problem: ManeuverProblem) -> ClearObjective:
-    configuration = configurations(problem.robot.wheel, problem.obstacle)[0]
+def left_plan(problem: Problem) -> ClearObjective:
+    configuration = configurations_of(problem)[0]
     plan = plan_configuration(problem, configuration)
     assert isinstance(plan, Plan)
-    return ClearObjective(TerminalObjective(plan.problem, problem.platform), problem.free_ground)
+    return ClearObjective(TerminalObjective(plan.problem, problem.robot), free_ground(problem))
 
 
 def test_violation_is_the_depth_of_the_footprint_outside() -> None:
@@ -186,7 +188,7 @@ def test_violation_is_the_depth_of_the_footprint_outside() -> None:
 def test_optimizers_see_the_violation(optimizer: str) -> None:
     """In a narrow space the terminal cost alone leaves it; with the violation every optimizer stays
     inside."""
-    problem = load_maneuver(PROBLEMS / FILES[1])
+    problem = load_problem(PROBLEMS / FILES[1])
     objective = left_plan(problem)
     found = minimize(objective, objective.bounds, optimizer=optimizer, seed=1)
     assert found.violation <= 1e-9, found.message
@@ -199,8 +201,8 @@ def test_optimizers_see_the_violation(optimizer: str) -> None:
 
 
 def test_other_optimizers_plan_too() -> None:
-    problem = load_maneuver(PROBLEMS / FILES[1])
-    configuration = configurations(problem.robot.wheel, problem.obstacle)[0]
+    problem = load_problem(PROBLEMS / FILES[1])
+    configuration = configurations_of(problem)[0]
     plan = plan_configuration(problem, configuration, optimizer="pso", seed=3)
     assert isinstance(plan, Plan)
     assert plan.wheel_error < 0.1
@@ -221,7 +223,7 @@ def test_other_optimizers_plan_too() -> None:
     ],
 )
 def test_one_clear_message_each(changes: dict[str, object], text: str) -> None:
-    problem = load_maneuver(PROBLEMS / FILES[0])
+    problem = load_problem(PROBLEMS / FILES[0])
     with pytest.raises((ProblemError, ArgumentError)) as caught:
         plan_climb(problem.replace(changes))
     assert text in str(caught.value)
@@ -229,27 +231,23 @@ def test_one_clear_message_each(changes: dict[str, object], text: str) -> None:
 
 
 def test_a_space_too_small_is_said_so() -> None:
-    problem = load_maneuver(PROBLEMS / FILES[0]).replace({"space.y": [-0.5, 0.5]})
+    problem = load_problem(PROBLEMS / FILES[0]).replace({"space.y": [-0.5, 0.5]})
     found = plan_climb(problem)
     assert not found.plans
     assert "the space is too small" in found.status
 
 
 def test_without_a_turn_wheel_angles_cannot_be_chosen() -> None:
-    problem = load_maneuver(PROBLEMS / FILES[0])
+    problem = load_problem(PROBLEMS / FILES[0])
     problem = problem.replace({"start.pose": [0.2, 0.0, math.radians(-35)]})
-    square_on = [
-        c
-        for c in configurations(problem.robot.wheel, problem.obstacle, problem.start.pose[2])
-        if c.name == "forward -35 deg"
-    ]
+    square_on = [c for c in configurations_of(problem) if c.name == "forward -35 deg"]
     refused = plan_configuration(problem, square_on[0])
     assert isinstance(refused, Refused)
     assert "turn" in refused.reason
 
 
 def test_each_loader_says_what_the_other_is_for() -> None:
-    with pytest.raises(ProblemError, match="load_maneuver"):
+    with pytest.raises(ProblemError, match="load_problem"):
         load_problem(PROBLEMS / FILES[0])
     with pytest.raises(ProblemError, match="loc8-smdw"):
-        load_maneuver(PROBLEMS / "scenario_1_lateral.toml")
+        load_problem(PROBLEMS / "scenario_1_lateral.toml")

@@ -11,13 +11,13 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
+from trajopt.problem import load_problem
 from trajopt.systems.smdw import pictures as smdw
 from trajopt.systems.smdw import search_pictures
 from trajopt.systems.smdw import trial_pictures as smdw_trials
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, loc8_smdw
 from trajopt.systems.smdw.geometry import meet_step
 from trajopt.systems.smdw.planner import plan_climb
-from trajopt.systems.smdw.problem import load_maneuver
 
 FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"
 
@@ -116,6 +116,6 @@ def test_figure_6_9_stands_the_step_at_the_highest_that_the_hub_clears() -> None
 
 
 def test_a_folder_of_plans_gets_its_overview(tmp_path: Path) -> None:
-    made = smdw.save_maneuver_pictures(plan_climb(load_maneuver(FILE)), tmp_path)
+    made = smdw.save_maneuver_pictures(plan_climb(load_problem(FILE)), tmp_path)
     assert [file.name for file in made] == ["plans.png", "geometry.png"]
     assert all(file.stat().st_size > 20_000 for file in made)

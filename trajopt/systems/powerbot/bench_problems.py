@@ -20,7 +20,7 @@ from trajopt.limits.speed import Speed
 from trajopt.objectives.base import Objective
 from trajopt.objectives.route import Corridor, RouteObjective
 from trajopt.paths.spline import uniform_basis
-from trajopt.problem.given_path import load_path_problem
+from trajopt.problem import load_problem
 from trajopt.robots.robot import robot
 from trajopt.systems.powerbot.constants import FRICTION, LARGEST_ACCELERATION, LARGEST_SPEED
 
@@ -88,20 +88,20 @@ def moved_knots(file: FilePath) -> RouteObjective:
     The limits are the physical ones and leave out the safety speed, which alone would set the
     duration.
     """
-    problem = load_path_problem(file)
-    if problem.ramps:
+    problem = load_problem(file, {"limits.variant": None})
+    if problem.ground.ramps:
         raise ArgumentError("problem", str(file), "a path on level ground")
     path = problem.flat_path
     free = tuple(range(1, len(path.basis.knots) - 1))
     bounds = np.array([(c - TILE, c + TILE) for knot in free for c in path.coordinates[knot]])
-    limits = tuple(m for m in problem.as_limits(variant="physical") if m.name != "safety_speed")
+    limits = tuple(m for m in problem.limits if m.name != "safety_speed")
     return RouteObjective(
         "duration",
         path.basis,
         path.coordinates,
         free,
         bounds,
-        problem.platform,
+        problem.robot,
         limits,
         cells=MOVED_CELLS,
     )

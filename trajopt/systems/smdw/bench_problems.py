@@ -8,7 +8,6 @@ with "+".
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,15 +16,14 @@ from trajopt.bench.problems import Family
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Objective
 from trajopt.objectives.terminal import terminal_objective, with_free
-from trajopt.problem.search import Problem, load_problem
+from trajopt.problem import Problem, load_problem
+from trajopt.systems.smdw.thesis import through_drives
 
 
 def of_file(text: str, root: Path) -> tuple[Objective, Array]:
     """The problem ``smdw/<text>``; ``root`` is the folder with problem files."""
     stem, free, limited = _parts(text)
     problem = load_problem(root / "smdw" / f"{stem}.toml")
-    if not isinstance(problem, Problem):
-        raise ArgumentError("problem", f"smdw/{text}", "a problem with a terminal objective")
     return _terminal(problem, free, limited)
 
 
@@ -34,8 +32,6 @@ def drawn(text: str, root: Path) -> tuple[Objective, Array]:
     the seed."""
     seed, free, limited = _parts(text)
     problem = load_problem(root / "smdw" / "scenario_1_forward35.toml")
-    if not isinstance(problem, Problem):
-        raise ArgumentError("problem", f"random-smdw/{text}", "a problem with a terminal objective")
     rng = np.random.default_rng(int(seed))
     pose = rng.uniform(
         [1.0, -1.0, 0.3], [2.8, 1.0, 1.5]
@@ -62,8 +58,9 @@ def _parts(text: str) -> tuple[str, str, bool]:
     return parts[0], parts[1], len(parts) == 3
 
 
-def _terminal(problem: Any, free: str, limited: bool) -> tuple[Objective, Array]:
-    changed = problem.replace(actuator={"enabled": limited}, objective={"kind": "terminal"})
+def _terminal(problem: Problem, free: str, limited: bool) -> tuple[Objective, Array]:
+    changed = problem.replace({"actuator": None, "objective.kind": "terminal"})
+    changed = through_drives(changed) if limited else changed
     objective = terminal_objective(with_free(changed, *free.split("+")))
     return objective, objective.bounds
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 from rich import box
@@ -25,6 +26,7 @@ from trajopt.cli.shared import (
 from trajopt.errors import ArgumentError
 
 if TYPE_CHECKING:
+    from trajopt.problem import Problem
     from trajopt.systems.smdw.planner import Maneuver, Plan
     from trajopt.systems.smdw.trials import ClimbTrial
 
@@ -40,10 +42,11 @@ def plan(
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folders")] = True,
 ) -> None:
     """Plan every configuration that can climb a step, best first."""
-    from trajopt.systems.smdw.planner import plan_climb
-    from trajopt.systems.smdw.problem import load_maneuver
+    from trajopt.pipeline import solve
+    from trajopt.problem import load_problem
 
-    found = plan_climb(load_maneuver(problem, overrides(set_)), optimizer=optimizer, seed=seed)
+    solution = solve(_climb(load_problem(problem, overrides(set_))), optimizer=optimizer, seed=seed)
+    found = cast("Maneuver", solution.details)
     console.print(
         f"[bold]{found.problem.title}[/bold]: {found.status} ({found.wall_time:.2f} s)",
         highlight=False,
@@ -77,20 +80,16 @@ def plan(
     ):  # the status names why there is no plan at all
         console.print(f"no plan for {none.configuration.name}: {none.reason}", highlight=False)
     if out is not None:
-        from trajopt.optimize.given import Given
-        from trajopt.pipeline import solve
-        from trajopt.report.pictures import save_pictures
         from trajopt.report.run_folder import write_solution
-        from trajopt.systems.smdw.pictures import save_maneuver_pictures
 
-        for rank, one in enumerate(found.plans, start=1):
+        every = (solution, *solution.alternatives)
+        for rank, (one, solved) in enumerate(zip(found.plans, every, strict=False), start=1):
             folder = out / f"{rank}_{one.configuration.name.replace(' ', '_')}"
-            solution = solve(one.problem, optimizer=Given(), x0=one.control_points[1:3, :2].ravel())
-            write_solution(solution, folder, seed=seed, command=" ".join(sys.argv))
-            if pictures:
-                save_pictures(solution, folder)
-        if pictures:
-            save_maneuver_pictures(found, out)
+            alone = replace(
+                solved, details=None
+            )  # what all plans share stands beside their folders
+            write_solution(alone, folder, seed=seed, command=" ".join(sys.argv), pictures=pictures)
+        found.save(out, pictures=pictures)
         console.print(f"written to {out}", highlight=False, soft_wrap=True)
     if not found.plans:
         raise typer.Exit(FAULTY)
@@ -115,10 +114,10 @@ def climb(
     pictures: Annotated[bool, typer.Option(help="draw a picture into the folder")] = True,
 ) -> None:
     """Drive a plan in physics and climb from where it ends, many times with random errors."""
+    from trajopt.problem import load_problem
     from trajopt.report.files import made_folder
     from trajopt.simulate.engine import make_engine
     from trajopt.systems.smdw.planner import plan_climb
-    from trajopt.systems.smdw.problem import load_maneuver
     from trajopt.systems.smdw.trial_files import (
         climb_trials_table,
         save_climb_trials_picture,
@@ -139,7 +138,7 @@ def climb(
     )  # an unknown one is refused before anything is planned, as is a folder that cannot be made
     if out is not None:
         made_folder(out)
-    found = plan_climb(load_maneuver(problem, overrides(set_)))
+    found = plan_climb(_climb(load_problem(problem, overrides(set_))))
     chosen = _chosen(found, configuration)
     facts = {
         "problem": found.problem.source,
@@ -173,6 +172,14 @@ def climb(
         if pictures:
             save_climb_trials_picture(done, found.problem, chosen, out)
         console.print(f"written to {out}", highlight=False, soft_wrap=True)
+
+
+def _climb(problem: Problem) -> Problem:
+    if problem.climb is None:
+        raise ArgumentError(
+            "problem", problem.source, "a problem with [climb]; trajopt solve others"
+        )
+    return problem
 
 
 def _chosen(maneuver: Maneuver, name: str | None) -> Plan:

@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
 
 from trajopt.arrays import Array
+from trajopt.problem import Problem
 from trajopt.report.ground_plan import draw_robot
 from trajopt.report.style import (
     BLACK,
@@ -34,9 +35,9 @@ from trajopt.systems.smdw.climbing import (
     climb_window,
     forward_alphas,
 )
+from trajopt.systems.smdw.entry import start_pose, step_of
 from trajopt.systems.smdw.geometry import DoubleWheel, contact_offset, meet_step, outline
-from trajopt.systems.smdw.planner import Maneuver, Plan
-from trajopt.systems.smdw.problem import ManeuverProblem
+from trajopt.systems.smdw.planner import Maneuver, Plan, wheel_of
 
 Pose = tuple[float, float, float]  # m, m, rad
 
@@ -262,7 +263,7 @@ def _draw_wheel_at_step(
     ax.grid(visible=False)
 
 
-def setups_figure(setups: Sequence[tuple[str, ManeuverProblem, Mapping[str, Pose]]]) -> Figure:
+def setups_figure(setups: Sequence[tuple[str, Problem, Mapping[str, Pose]]]) -> Figure:
     """Start, space and step of manoeuvre problems, with named printed targets (m, m, rad; Figures
     6.3 and 6.10)."""
     figure = new_figure(3.7, 8.4)
@@ -271,13 +272,13 @@ def setups_figure(setups: Sequence[tuple[str, ManeuverProblem, Mapping[str, Pose
         figure.subplots(1, len(setups), squeeze=False)[0], setups, strict=True
     ):
         _draw_ground(ax, problem)
-        draw_robot(ax, problem.platform, np.array(problem.start.pose), strong=True)
+        draw_robot(ax, problem.robot, np.array(start_pose(problem)), strong=True)
         for target, colour in zip(targets.values(), colours, strict=False):
-            draw_robot(ax, problem.platform, np.array(target), colour=colour)
+            draw_robot(ax, problem.robot, np.array(target), colour=colour)
         ax.set(
             title=title,
-            xlabel=f"x (m)\nstep of {100 * problem.obstacle.height:g} cm at x = "
-            f"{problem.obstacle.place[0]:g} m",
+            xlabel=f"x (m)\nstep of {100 * step_of(problem).height:g} cm at x = "
+            f"{step_of(problem).place[0]:g} m",
         )
     names = setups[0][2]
     handles = [
@@ -295,7 +296,9 @@ def plans_figure(maneuver: Maneuver, heading: str = "") -> Figure:
     """Every plan on the ground: path, outlines of the robot, the step and the space."""
     count = max(len(maneuver.plans), 1)
     columns, rows = min(count, 3), math.ceil(count / 3)
-    (x0, x1), (y0, y1) = maneuver.problem.space.x, maneuver.problem.space.y
+    space = maneuver.problem.space
+    assert space is not None  # the job needs it
+    (x0, x1), (y0, y1) = space.x, space.y
     each = 2.4 * (y1 - y0 + 0.2) / (x1 - x0 + 0.4)  # inch: as high as a panel 2.4 inches wide needs
     figure = new_figure(rows * (each + 0.65) + 0.2, 8.4)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
@@ -311,28 +314,23 @@ def plans_figure(maneuver: Maneuver, heading: str = "") -> Figure:
     return figure
 
 
-def _draw_ground(ax: Axes, problem: ManeuverProblem) -> None:
+def _draw_ground(ax: Axes, problem: Problem) -> None:
     """The step, the place where it shall be met, and the space."""
-    nx, ny = problem.obstacle.normal
-    edge = np.array(problem.obstacle.place)
-    along, depth = 6.0 * np.array([-ny, nx]), 0.25 * np.array([nx, ny])
-    ax.add_patch(
-        Polygon(
-            [edge - along, edge + along, edge + along + depth, edge - along + depth], color=LIGHT
-        )
-    )
-    (x0, x1), (y0, y1) = problem.space.x, problem.space.y
+    step, space = step_of(problem), problem.space
+    assert space is not None  # the job needs it
+    ax.add_patch(Polygon(step.outline, color=LIGHT))
+    (x0, x1), (y0, y1) = space.x, space.y
     ax.add_patch(Rectangle((x0, y0), x1 - x0, y1 - y0, fill=False, edgecolor=GREY, linestyle="--"))
-    ax.plot(*edge, "x", color=BLACK)
+    ax.plot(*step.place, "x", color=BLACK)
     ax.set(aspect="equal", ylabel="y (m)", xlim=(x0 - 0.1, x1 + 0.3), ylim=(y0 - 0.1, y1 + 0.1))
 
 
-def _draw_plan(ax: Axes, problem: ManeuverProblem, plan: Plan) -> None:
+def _draw_plan(ax: Axes, problem: Problem, plan: Plan) -> None:
     _draw_ground(ax, problem)
     times = np.linspace(0.0, plan.duration, 200)
     pose = plan.trajectory.at(times).pose
     for k in np.linspace(0, len(times) - 1, _OUTLINES).astype(int):
-        draw_robot(ax, problem.platform, pose[k], strong=k in (0, len(times) - 1))
+        draw_robot(ax, problem.robot, pose[k], strong=k in (0, len(times) - 1))
     ax.plot(pose[:, 0], pose[:, 1], color=BLUE)
     ax.plot(
         plan.control_points[:, 0], plan.control_points[:, 1], "o", color=VERMILION, markersize=3
@@ -348,7 +346,7 @@ def save_maneuver_pictures(maneuver: Maneuver, folder: FilePath) -> tuple[FilePa
     with in_style():
         save_figure(plans_figure(maneuver), plans)
         save_figure(
-            geometry_figure(maneuver.problem.robot.wheel, maneuver.problem.obstacle.height),
+            geometry_figure(wheel_of(maneuver.problem), step_of(maneuver.problem).height),
             geometry,
         )
     return plans, geometry

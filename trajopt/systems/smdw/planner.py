@@ -14,6 +14,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -23,11 +24,11 @@ from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.base import AffinePart
 from trajopt.objectives.clearance import ClearObjective
 from trajopt.objectives.terminal import TerminalObjective
-from trajopt.optimize.base import Budget, Optimizer
+from trajopt.optimize.base import Budget, Optimizer, Progress
 from trajopt.optimize.lattice import lattice_points
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
-from trajopt.problem.search import WHEELS, Problem, WheelName
+from trajopt.problem import Problem
 from trajopt.robots.robot import Robot
 from trajopt.systems.smdw.climbing import (
     LARGEST_FORWARD_ALPHA,
@@ -38,12 +39,13 @@ from trajopt.systems.smdw.climbing import (
     forward_alphas,
     refusal,
 )
+from trajopt.systems.smdw.entry import WHEELS, free_ground, start_pose, step_of
 from trajopt.systems.smdw.geometry import DoubleWheel
-from trajopt.systems.smdw.problem import ManeuverProblem, ObstacleSection
 from trajopt.timing.compiled import load_kernel
 from trajopt.timing.scaling import rough_duration, time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.free_ground import path_margin
+from trajopt.world.obstacles import Step
 
 THESIS_ALPHAS = (
     math.radians(35.0),
@@ -93,7 +95,7 @@ class Configuration:
     alpha: float
     window: Window
     yaw: float
-    critical: tuple[WheelName, WheelName]
+    critical: tuple[str, str]
 
     @property
     def name(self) -> str:
@@ -165,10 +167,36 @@ class Maneuver:
     """Plans, best first, and the configurations that were refused; ``wall_time`` (s) for all of it
     but the loading of compiled kernels, once a process."""
 
-    problem: ManeuverProblem
+    problem: Problem
     plans: tuple[Plan, ...]
     refused: tuple[Refused, ...]
     wall_time: float
+
+    @property
+    def faults(self) -> tuple[str, ...]:
+        """None: a manoeuvre without a plan has no path either, and that is said already."""
+        return ()
+
+    @property
+    def notes(self) -> dict[str, Any]:
+        """Plans and refused configurations, for a summary."""
+        plans = {
+            plan.configuration.name: {
+                "duration_s": plan.duration,
+                "room_m": plan.room,
+                "phase_margin_rad": plan.margin,
+                "climb_rate": plan.climb_rate,
+            }
+            for plan in self.plans
+        }
+        return {"plans": plans, "refused": {r.configuration.name: r.reason for r in self.refused}}
+
+    def save(self, folder: FilePath, *, pictures: bool) -> None:
+        """Pictures of all plans and of the wheel's geometry."""
+        if pictures:
+            from trajopt.systems.smdw.pictures import save_maneuver_pictures
+
+            save_maneuver_pictures(self, folder)
 
     @property
     def status(self) -> str:
@@ -177,7 +205,7 @@ class Maneuver:
             best = self.plans[0]
             return (
                 f"{len(self.plans)} of {len(self.plans) + len(self.refused)} configurations have a plan; best by "
-                f"{self.problem.approach.rank}: {best.configuration.name}, {best.duration:.2f} s"
+                f"{self.problem.climb.rank}: {best.configuration.name}, {best.duration:.2f} s"
             )
         first, others = self.refused[0], len(self.refused) - 1
         more = f" ({others} other configurations have none either)" if others else ""
@@ -185,29 +213,37 @@ class Maneuver:
 
 
 def configurations(
-    wheel: DoubleWheel, obstacle: ObstacleSection, start_yaw: float = 0.0
+    wheel: DoubleWheel,
+    obstacle: Step,
+    start_yaw: float = 0.0,
+    alphas: Sequence[float] | None = None,
 ) -> tuple[Configuration, ...]:
     """All configurations that can climb the obstacle after at most a quarter turn from
     ``start_yaw`` (rad).
 
-    Lateral with alpha 0, left or right side first; forward with the thesis's 35 and 45 deg, either
-    sign, where the geometry allows them, and otherwise the middle of what it allows. Raises
-    ArgumentError for a step that the wheel cannot climb at all.
+    Lateral with alpha 0, left or right side first; forward with ``alphas`` (rad), None for the
+    thesis's 35 and 45 deg, either sign, where the geometry allows them, and otherwise the middle of
+    what it allows. Raises ArgumentError for a step that the wheel cannot climb at all, and for
+    alphas of which it allows none.
     """
     reason = refusal(wheel, Motion.LEFT, 0.0, obstacle.height)
     if reason:
         raise ArgumentError("obstacle.height", obstacle.height, f"a lower step: {reason}")
     span = forward_alphas(wheel, obstacle.height)
-    alphas: list[float] = []
+    inside: list[float] = []
     if span is not None:
-        inside = [
-            a for a in THESIS_ALPHAS if span[0] <= a <= min(span[1] + 1e-3, LARGEST_FORWARD_ALPHA)
-        ]
-        alphas = inside or [sum(span) / 2]
+        largest = min(span[1] + 1e-3, LARGEST_FORWARD_ALPHA)
+        tried = THESIS_ALPHAS if alphas is None else [abs(a) for a in alphas]
+        inside = [a for a in tried if span[0] <= a <= largest]
+        if not inside and alphas is None:
+            inside = [sum(span) / 2]
+    if alphas is not None and not inside:
+        allowed = "none" if span is None else f"some between {span[0]:.4g} and {largest:.4g} rad"
+        raise ArgumentError("climb.alphas", list(alphas), f"{allowed} for this step")
     wanted = [
         (Motion.LEFT, 0.0),
         (Motion.RIGHT, 0.0),
-        *((Motion.FORWARD, s * a) for a in alphas for s in (-1, 1)),
+        *((Motion.FORWARD, s * a) for a in inside for s in (-1, 1)),
     ]
     found = (_configuration(wheel, obstacle, motion, alpha, start_yaw) for motion, alpha in wanted)
     return tuple(
@@ -215,8 +251,19 @@ def configurations(
     )
 
 
+def configurations_of(problem: Problem) -> tuple[Configuration, ...]:
+    """Those of a problem's step and robot. Raises ArgumentError as ``configurations``."""
+    yaw = start_pose(problem)[2]
+    return configurations(wheel_of(problem), step_of(problem), yaw, problem.climb.alphas)
+
+
+def wheel_of(problem: Problem) -> DoubleWheel:
+    """The sizes of the robot's double wheels."""
+    return DoubleWheel.of(problem.robot.rolling[0])
+
+
 def _configuration(
-    wheel: DoubleWheel, obstacle: ObstacleSection, motion: Motion, alpha: float, start_yaw: float
+    wheel: DoubleWheel, obstacle: Step, motion: Motion, alpha: float, start_yaw: float
 ) -> Configuration | None:
     window = climb_window(wheel, motion, alpha, obstacle.height)
     if window is None:
@@ -224,7 +271,7 @@ def _configuration(
     sideways = {Motion.FORWARD: 0.0, Motion.LEFT: -math.pi / 2, Motion.RIGHT: math.pi / 2}[motion]
     yaw = obstacle.direction + alpha + sideways
     yaw = start_yaw + float(fold(yaw - start_yaw))
-    critical: tuple[WheelName, WheelName] = ("front-left", "front-right")
+    critical = ("front-left", "front-right")
     if motion is Motion.FORWARD and alpha > 0:
         critical = ("front-right", "front-left")
     elif motion.lateral:
@@ -235,21 +282,21 @@ def _configuration(
 
 
 def approach_target(
-    problem: ManeuverProblem, configuration: Configuration, *, phase: float | None = None
+    problem: Problem, configuration: Configuration, *, phase: float | None = None
 ) -> Target:
     """Pose and wheel angles at the end of the approach.
 
-    The foremost corner of the footprint is ``approach.gap`` before the step. Going on along the
+    The foremost corner of the footprint is ``climb.gap`` before the step. Going on along the
     motion, each critical wheel turns by travel/R until it meets the step with ``phase`` (rad, along
     the rotation; default: the middle of the window); the leading one meets it at the wanted place
     (lateral: the middle between both).
     """
-    c, robot, step = configuration, problem.platform, problem.obstacle
+    c, robot, step = configuration, problem.robot, step_of(problem)
     phase = c.window.middle if phase is None else phase
     turn, normal = rotation(c.yaw), np.array(step.normal)
     motion = turn @ c.direction
     corners = np.array(robot.footprint) @ turn.T @ normal
-    room = problem.approach.gap + float(corners.max())  # of the robot's centre, along the normal
+    room = problem.climb.gap + float(corners.max())  # of the robot's centre, along the normal
     places = _wheel_places(robot)
     travel = _travel(problem, c, room, c.yaw, phase)
     lead = (
@@ -268,7 +315,7 @@ def approach_target(
         half_turn = (
             0.0 if name.endswith("left") == c.faces_left else math.pi
         )  # the hub that faces the step counts
-        wheels[i] = float(spin[i] * (phase - distance / problem.robot.wheel.radius)) + half_turn
+        wheels[i] = float(spin[i] * (phase - distance / wheel_of(problem).radius)) + half_turn
     return Target(
         (float(position[0]), float(position[1]), c.yaw),
         (wheels[0], wheels[1], wheels[2], wheels[3]),
@@ -277,11 +324,12 @@ def approach_target(
 
 
 def travel_to_step(
-    problem: ManeuverProblem, configuration: Configuration, pose: tuple[float, float, float]
+    problem: Problem, configuration: Configuration, pose: tuple[float, float, float]
 ) -> tuple[float, float]:
     """What each critical wheel has left (m) from a pose along the motion until it meets the step in
     the middle of its window."""
-    normal, place = np.array(problem.obstacle.normal), np.array(problem.obstacle.place)
+    step = step_of(problem)
+    normal, place = np.array(step.normal), np.array(step.place)
     return _travel(
         problem,
         configuration,
@@ -292,18 +340,19 @@ def travel_to_step(
 
 
 def _travel(
-    problem: ManeuverProblem, configuration: Configuration, room: float, yaw: float, phase: float
+    problem: Problem, configuration: Configuration, room: float, yaw: float, phase: float
 ) -> tuple[float, float]:
     """The same with the robot's centre ``room`` (m) before the step, for a ``phase`` (rad) of
     contact."""
-    c, normal, turn = configuration, np.array(problem.obstacle.normal), rotation(yaw)
-    reach = collision_reach(problem.robot.wheel, phase, c.motion, c.alpha, problem.obstacle.height)
-    places, ahead = _wheel_places(problem.platform), normal @ (turn @ c.direction)
+    step = step_of(problem)
+    c, normal, turn = configuration, np.array(step.normal), rotation(yaw)
+    reach = collision_reach(wheel_of(problem), phase, c.motion, c.alpha, step.height)
+    places, ahead = _wheel_places(problem.robot), normal @ (turn @ c.direction)
     first, second = (float((room - normal @ turn @ places[w] - reach) / ahead) for w in c.critical)
     return first, second
 
 
-def _wheel_places(robot: Robot) -> dict[WheelName, Array]:
+def _wheel_places(robot: Robot) -> dict[str, Array]:
     """Where each wheel stands in the body (2,), m."""
     return {
         w: np.array(
@@ -316,41 +365,30 @@ def _wheel_places(robot: Robot) -> dict[WheelName, Array]:
     }
 
 
-def search_problem(
-    problem: ManeuverProblem, configuration: Configuration, target: Target
-) -> Problem:
+def search_problem(problem: Problem, configuration: Configuration, target: Target) -> Problem:
     """The terminal problem of one configuration: goal and critical wheels filled in. Raises
     ProblemError."""
-    shown: dict[str, Any] = {
-        "title": f"{problem.title}: {configuration.name}",
-        "start": problem.start,
-        "goal": {"pose": target.pose, "wheels": target.wheels, "critical": configuration.critical},
-        "space": problem.space,
-        "limits": problem.limits,
-        # The nominal duration only matters to searches through actuators; 0.5 m/s, chosen.
-        "spline": {
-            "duration": 2.0 * math.dist(target.pose[:2], problem.start.pose[:2]) + 0.5,
-            "free": ("p1", "p2"),
-        },
-        "scene": {
-            "obstacle_height": problem.obstacle.height,
-            "friction": problem.ground.friction,
-            "motion": "lateral" if configuration.motion.lateral else "forward",
-        },
-        "source": problem.source,
-    }
-    return Problem.model_validate(shown)
+    goal = {"pose": target.pose, "wheels": target.wheels, "critical": configuration.critical}
+    return problem.replace(
+        {
+            "title": f"{problem.title}: {configuration.name}",
+            "climb": None,
+            "goal": goal,
+            "spline": {"free": ["p1", "p2"]},
+        }
+    )
 
 
 def plan_climb(
-    problem: ManeuverProblem,
+    problem: Problem,
     *,
     optimizer: str | Optimizer = "lattice",
     seed: int = 0,
     budget: Budget | None = None,
+    progress: Progress | None = None,
 ) -> Maneuver:
     """Plans for every configuration that can climb the obstacle, ranked by
-    ``problem.approach.rank``.
+    ``problem.climb.rank``.
 
     ``optimizer``: "lattice" looks through all exact solutions; any other searches P1 and P2 with
     footprint and wheel angles judged together (its wheel errors are what it finds). Raises
@@ -360,11 +398,14 @@ def plan_climb(
     started = time.perf_counter()
     plans: list[Plan] = []
     refused: list[Refused] = []
-    for configuration in configurations(
-        problem.robot.wheel, problem.obstacle, problem.start.pose[2]
-    ):
+    for configuration in configurations_of(problem):
         outcome = plan_configuration(
-            problem, configuration, optimizer=optimizer, seed=seed, budget=budget
+            problem,
+            configuration,
+            optimizer=optimizer,
+            seed=seed,
+            budget=budget,
+            progress=progress,
         )
         if isinstance(outcome, Plan):
             plans.append(outcome)
@@ -375,38 +416,44 @@ def plan_climb(
         "margin": lambda p: (-p.margin, p.duration),
         "climb_rate": lambda p: (-p.climb_rate, p.duration),
     }
-    plans.sort(key=keys[problem.approach.rank])
+    plans.sort(key=keys[problem.climb.rank])
     return Maneuver(problem, tuple(plans), tuple(refused), time.perf_counter() - started)
 
 
 def plan_configuration(
-    problem: ManeuverProblem,
+    problem: Problem,
     configuration: Configuration,
     *,
     optimizer: str | Optimizer = "lattice",
     seed: int = 0,
     budget: Budget | None = None,
+    progress: Progress | None = None,
     target: Target | None = None,
 ) -> Plan | Refused:
     """Plan of one configuration (to ``target`` instead of its own where given), or why there is
     none."""
     target = approach_target(problem, configuration) if target is None else target
-    ground = problem.free_ground
+    ground = free_ground(problem)
     complaint = ground.complaint(*target.pose)
     if complaint:
         return Refused(configuration, f"the space is too small: at the target {complaint}")
-    if abs(target.pose[2] - problem.start.pose[2]) < 1e-3:
+    if abs(target.pose[2] - start_pose(problem)[2]) < 1e-3:
         return Refused(
             configuration,
             "no turn between start and target, so wheel angles cannot be chosen: turn first",
         )
     made = search_problem(problem, configuration, target)
-    objective = ClearObjective(TerminalObjective(made, problem.platform), ground)
+    objective = ClearObjective(TerminalObjective(made, made.robot), ground)
     if optimizer == "lattice":
         objective, candidates = _lattice(objective, configuration)
     else:
         candidates = minimize(
-            objective, objective.bounds, optimizer=optimizer, seed=seed, budget=budget
+            objective,
+            objective.bounds,
+            optimizer=optimizer,
+            seed=seed,
+            budget=budget,
+            progress=progress,
         ).x[None]
     if len(candidates) == 0:
         return Refused(
@@ -452,7 +499,8 @@ def _bases(
     objective: ClearObjective, part: AffinePart, bulges: Sequence[tuple[float, float]]
 ) -> list[Array]:
     """Control points around which exact ones are looked for: the default, bent to either side."""
-    start, goal = objective.terminal.problem.start.pose, objective.terminal.problem.goal.pose
+    task = objective.terminal.problem.search
+    start, goal = task.start, task.goal
     chord = np.array([goal[0] - start[0], goal[1] - start[1]])
     aside = np.array([-chord[1], chord[0]])
     low, high = objective.bounds[:, 0], objective.bounds[:, 1]
@@ -462,7 +510,7 @@ def _bases(
 
 
 def _fastest(
-    problem: ManeuverProblem,
+    problem: Problem,
     configuration: Configuration,
     target: Target,
     objective: ClearObjective,
@@ -471,7 +519,7 @@ def _fastest(
     """The fastest of the most promising candidates, after checks on the fine grid."""
     reason = "every exact path leaves the free ground between the points of the search grid"
     timed: list[tuple[float, Path]] = []
-    limits, robot = problem.limits.as_limits(), problem.platform
+    limits, robot = problem.limits, problem.robot
     for candidate in candidates[:TIMED_CANDIDATES]:
         path = objective.path(candidate)
         if path_margin(path, objective.ground) < 0:
@@ -482,7 +530,7 @@ def _fastest(
             reason = str(error)
     for _, path in sorted(timed, key=lambda t: t[0]):
         try:
-            trajectory = time_scale(path, limits, robot=robot)
+            trajectory = time_scale(path, limits, robot=robot, start_wheels=problem.start_wheels)
             return _plan(problem, configuration, target, objective, trajectory)
         except InfeasibleError as error:
             reason = str(error)
@@ -490,17 +538,15 @@ def _fastest(
 
 
 def _plan(
-    problem: ManeuverProblem,
+    problem: Problem,
     configuration: Configuration,
     target: Target,
     objective: ClearObjective,
     trajectory: Trajectory,
 ) -> Plan:
     made, path = objective.terminal.problem, trajectory.path
-    end = trajectory.at(trajectory.duration).wheel_angles[0] + np.array(problem.start.wheels)
-    errors = fold(end - np.array(target.wheels), made.objective.period)[
-        list(made.goal.critical_indices)
-    ]
+    end = trajectory.at(trajectory.duration).wheel_angles[0]
+    errors = fold(end - np.array(target.wheels), made.objective.period)[list(made.critical_indices)]
     assert path.heading is not None  # the objective's paths choose their heading
     return Plan(
         configuration,
@@ -512,7 +558,7 @@ def _plan(
         float(np.max(np.abs(errors))),
         path_margin(path, objective.ground),
         configuration.window.half_width,
-        predicted_climb_rate(configuration, problem.obstacle.height),
+        predicted_climb_rate(configuration, step_of(problem).height),
     )
 
 

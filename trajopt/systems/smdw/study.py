@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 
 from trajopt.errors import ArgumentError
+from trajopt.problem import Problem
 from trajopt.sweeps.cases import Case
 from trajopt.systems.smdw.climb import Climb, run_climb
-from trajopt.systems.smdw.planner import approach_target, configurations, travel_to_step
-from trajopt.systems.smdw.problem import ManeuverProblem
+from trajopt.systems.smdw.planner import approach_target, configurations_of, travel_to_step
 from trajopt.systems.smdw.trials import before_step, critical_wheels, four, step_scene
 
 POSITION_SD = 0.003  # m, of the state a climb starts from; chosen
 WHEEL_SD = 0.05  # rad; chosen
 
 
-def trial(case: Case, problem: ManeuverProblem) -> dict[str, Any]:
+def trial(case: Case, problem: Problem) -> dict[str, Any]:
     """Climb the problem's step with ``case["configuration"]`` (its name, e.g. "lateral left"),
     ``friction``, ``torque`` (N m a wheel), ``heading_error`` (rad) and ``engine``; a ``repeat``
     draws other errors.
@@ -30,7 +30,7 @@ def trial(case: Case, problem: ManeuverProblem) -> dict[str, Any]:
     ``climbed`` is 1 when both leading wheels came up, else 0, and missing where the run left
     physics. Raises ArgumentError for a configuration that this step does not have.
     """
-    found = {c.name: c for c in configurations(problem.robot.wheel, problem.obstacle)}
+    found = {c.name: c for c in configurations_of(problem)}
     if case["configuration"] not in found:
         raise ArgumentError("configuration", case["configuration"], "one of " + ", ".join(found))
     chosen, rng = found[case["configuration"]], case.rng()

@@ -14,11 +14,12 @@ from rich import box
 from rich.table import Table
 
 from trajopt.arrays import Array
+from trajopt.problem import Problem
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import made_folder, write_json, write_text
 from trajopt.report.intervals import wilson
+from trajopt.systems.smdw.entry import step_of
 from trajopt.systems.smdw.planner import Plan
-from trajopt.systems.smdw.problem import ManeuverProblem
 from trajopt.systems.smdw.trials import ClimbTrial
 
 COLUMNS = (
@@ -102,7 +103,7 @@ def write_climb_trials(
 
 
 def save_climb_trials_picture(
-    trials: Sequence[ClimbTrial], problem: ManeuverProblem, plan: Plan, folder: FilePath
+    trials: Sequence[ClimbTrial], problem: Problem, plan: Plan, folder: FilePath
 ) -> FilePath:
     """Draw approaches and climbs from above into trials.png; its path.
 
@@ -112,7 +113,7 @@ def save_climb_trials_picture(
     from trajopt.report.style import in_style, save_figure
     from trajopt.systems.smdw.trial_pictures import Motions, motions_figure
 
-    step, sound = problem.obstacle, [t for t in trials if t.climb is not None and not t.exploded]
+    step, sound = step_of(problem), [t for t in trials if t.climb is not None and not t.exploded]
     edge = float(np.array(step.normal) @ np.array(step.place))
     ups = [t.outcome is not None and t.outcome.critical_up for t in sound]
     planned = _turned(plan.trajectory.at(np.linspace(0.0, plan.duration, 200)).pose, step.direction)
@@ -137,7 +138,7 @@ def save_climb_trials_picture(
     ]
     with in_style():
         return save_figure(
-            motions_figure(panels, problem.platform, columns=2), made_folder(folder) / "trials.png"
+            motions_figure(panels, problem.robot, columns=2), made_folder(folder) / "trials.png"
         )
 
 

@@ -21,7 +21,8 @@ from trajopt.arrays import Array, require_not_negative
 from trajopt.control.approach import Mode, Sensors, approach_controller
 from trajopt.control.bend import Goal
 from trajopt.errors import ArgumentError
-from trajopt.problem.search import WHEELS
+from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.problem import Problem
 from trajopt.simulate.check import SAMPLE_TIME
 from trajopt.simulate.engine import Command, Recording
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
@@ -35,8 +36,8 @@ from trajopt.systems.smdw.climb import (
     record_climb,
     run_approach,
 )
-from trajopt.systems.smdw.planner import Configuration, Plan, travel_to_step
-from trajopt.systems.smdw.problem import ManeuverProblem
+from trajopt.systems.smdw.entry import WHEELS, free_ground, start_pose, step_of
+from trajopt.systems.smdw.planner import Configuration, Plan, travel_to_step, wheel_of
 
 NEAREST = 0.004  # m, least gap to the step that a climb starts with; chosen
 
@@ -78,20 +79,26 @@ class ClimbTrial:
         return self.outcome is None or self.outcome.exploded
 
 
-def step_scene(problem: ManeuverProblem, friction: float, torque: float | None = None) -> StepScene:
+def step_scene(problem: Problem, friction: float, torque: float | None = None) -> StepScene:
     """The problem's step and wheels with another friction and torque (N m a wheel; None: the
     problem's)."""
-    r = problem.robot
+    step, wheel = step_of(problem), wheel_of(problem)
     return StepScene(
-        problem.obstacle.height,
-        problem.obstacle.place,
-        problem.obstacle.direction,
+        step.height,
+        step.place,
+        step.direction,
         friction,
-        r.torque_limit if torque is None else torque,
-        r.minor_radius,
-        r.hub_depth,
-        r.hub_gap,
+        float(problem.robot.motor_array("torque").min()) if torque is None else torque,
+        wheel.minor_radius,
+        wheel.depth,
+        wheel.gap,
     )
+
+
+def largest_wheel_speed(problem: Problem) -> float:
+    """What every wheel may reach, rad/s."""
+    found = [limit.largest for limit in problem.limits if isinstance(limit, WheelSpeed)]
+    return float(np.min(found)) if found else math.inf
 
 
 def critical_wheels(configuration: Configuration) -> tuple[int, int]:
@@ -99,15 +106,14 @@ def critical_wheels(configuration: Configuration) -> tuple[int, int]:
     return WHEELS.index(configuration.critical[0]), WHEELS.index(configuration.critical[1])
 
 
-def before_step(problem: ManeuverProblem, pose: Array) -> tuple[float, float, float]:
+def before_step(problem: Problem, pose: Array) -> tuple[float, float, float]:
     """The pose (3,), moved back from the step where a corner of the robot is nearer to it than
     NEAREST."""
     x, y, yaw = (float(v) for v in pose)
-    normal, turned = np.array(problem.obstacle.normal), yaw - problem.obstacle.direction
-    corners = np.array(problem.platform.footprint) @ np.array([math.cos(turned), -math.sin(turned)])
-    room = (
-        float(normal @ (np.array(problem.obstacle.place) - [x, y])) - NEAREST - float(corners.max())
-    )
+    step = step_of(problem)
+    normal, turned = np.array(step.normal), yaw - step.direction
+    corners = np.array(problem.robot.footprint) @ np.array([math.cos(turned), -math.sin(turned)])
+    room = float(normal @ (np.array(step.place) - [x, y])) - NEAREST - float(corners.max())
     return (
         (x, y, yaw)
         if room >= 0.0
@@ -122,19 +128,19 @@ def four(values: Array) -> Four:
 
 
 def approach_command(
-    problem: ManeuverProblem, plan: Plan, rng: Generator, scatter: Scatter | None = None
+    problem: Problem, plan: Plan, rng: Generator, scatter: Scatter | None = None
 ) -> Command:
     """The plan's wheel speeds from a start with random errors of pose and wheel angles."""
     scatter = Scatter() if scatter is None else scatter
     times = np.linspace(0.0, plan.duration, max(2, round(plan.duration / SAMPLE_TIME)))
     errors = rng.normal(0.0, [scatter.position, scatter.position, scatter.yaw])
-    x, y, yaw = (float(v) for v in np.array(problem.start.pose) + errors)
-    wheels = np.array(problem.start.wheels) + rng.normal(0.0, scatter.wheels, 4)
+    x, y, yaw = (float(v) for v in np.array(start_pose(problem)) + errors)
+    wheels = problem.start_wheels + rng.normal(0.0, scatter.wheels, 4)
     return Command(times, plan.trajectory.at(times).wheel_speeds, (x, y, yaw), four(wheels))
 
 
 def climb_trial(
-    problem: ManeuverProblem,
+    problem: Problem,
     plan: Plan,
     number: int,
     *,
@@ -166,21 +172,21 @@ def climb_trial(
     end = plan.trajectory.at(plan.duration)
     goal = Goal(
         end.pose[0],
-        np.array(problem.start.wheels) + end.wheel_angles[0],
+        end.wheel_angles[0],
         critical,
-        problem.limits.wheel_speed or math.inf,
+        largest_wheel_speed(problem),
     )
     if control is None:
         approach = run_approach(step, command, engine=engine)
     else:
         controller = approach_controller(
             plan.trajectory,
-            problem.platform,
+            problem.robot,
             np.array(command.start_wheel_angles),
             critical,
             cap=goal.cap,
             goal_wheels=goal.wheels,
-            ground=problem.free_ground,
+            ground=free_ground(problem),
             sensors=sensors,
             mode=control,
             rng=rng,
@@ -214,7 +220,7 @@ def climb_trial(
 
 
 def climb_trials(
-    problem: ManeuverProblem,
+    problem: Problem,
     plan: Plan,
     numbers: Sequence[int],
     *,

@@ -1,0 +1,149 @@
+"""A given path, and a speed profile to follow along it."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+from pathlib import Path as FilePath
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from trajopt.errors import ArgumentError
+from trajopt.limits.speed_bound import SpeedProfile
+from trajopt.paths.path import Path
+from trajopt.schema import NonNegative, Point, Positive, Section, broken_rule
+
+
+class PathSection(Section):
+    """A cubic spline through points, given here or in a CSV file."""
+
+    points: tuple[Point, ...] | None = Field(None, description="x, y, m", min_length=2)
+    file: str | None = Field(
+        None, description="CSV with columns x, y (m), and yaw (rad) where the heading is free"
+    )
+    heading: Literal["along", "free"] = Field(
+        "along", description="along: the direction of travel; free: as headings say"
+    )
+    headings: tuple[float, ...] | None = Field(
+        None, description="yaw at the points, rad, with a free heading"
+    )
+    spacing: Literal["chord", "uniform"] = Field(
+        "chord", description="of the points in the spline's parameter: chord lengths, or 1 each"
+    )
+    start_heading: float | None = Field(
+        None, description="direction of travel at the first point, rad; absent: a natural end"
+    )
+    start_rate: Positive | None = Field(
+        None, description="|d position / d parameter| there, m a unit of the parameter"
+    )
+    goal_heading: float | None = Field(None, description="the same at the last point, rad")
+    goal_rate: Positive | None = Field(None, description="the same at the last point, m a unit")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if (self.points is None) == (self.file is None):
+            raise broken_rule("points", self.points, "points or file, one of them")
+        for end in ("start", "goal"):
+            if (getattr(self, f"{end}_heading") is None) != (getattr(self, f"{end}_rate") is None):
+                value = getattr(self, f"{end}_rate")
+                expected = f"{end}_heading and {end}_rate both given or both left out"
+                raise broken_rule(f"{end}_rate", value, expected)
+        given = self.headings is not None
+        if given and self.heading == "along":
+            raise broken_rule("headings", list(self.headings or ()), 'none, or heading = "free"')
+        if self.points is None and given:
+            raise broken_rule("headings", list(self.headings or ()), "none: the file has a yaw")
+        if self.points is not None:
+            if self.heading == "free" and not given:
+                raise broken_rule("headings", None, "one yaw a point, as heading is free")
+            _require_apart("points", self.points)
+            if self.headings is not None and len(self.headings) != len(self.points):
+                expected = f"{len(self.points)} angles, one a point"
+                raise broken_rule("headings", list(self.headings), expected)
+        return self
+
+    def path(self, folder: FilePath, turning_length: float) -> Path:
+        """The path in the plane; a file is looked for in ``folder``."""
+        points, headings = self.points, self.headings
+        if self.file is not None:
+            points, headings = read_points(folder / self.file, self.heading == "free")
+        assert points is not None  # one of both is given
+        count = len(points)
+        return Path.through(
+            points,
+            heading=headings,
+            knots=np.arange(count, dtype=np.float64) if self.spacing == "uniform" else None,
+            start_direction=_direction(self.start_heading, self.start_rate),
+            end_direction=_direction(self.goal_heading, self.goal_rate),
+            turning_length=turning_length,
+        )
+
+
+def read_points(
+    file: FilePath, with_yaw: bool
+) -> tuple[tuple[Point, ...], tuple[float, ...] | None]:
+    """Points and yaws of a CSV file. Raises the broken rule of ``file``."""
+    names = ("x", "y", "yaw") if with_yaw else ("x", "y")
+    try:
+        with file.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
+        table = np.array([[float(row[name]) for name in names] for row in rows])
+        if len(table) < 2 or not np.all(np.isfinite(table)):
+            raise ValueError("fewer than two rows, or numbers that are not finite")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        expected = f"a CSV file with columns {', '.join(names)} ({error})"
+        raise broken_rule("path.file", str(file), expected) from None
+    points = tuple((float(x), float(y)) for x, y in table[:, :2])
+    _require_apart("path.file", points)
+    return points, tuple(table[:, 2].tolist()) if with_yaw else None
+
+
+def _require_apart(key: str, points: tuple[Point, ...]) -> None:
+    for i, (a, b) in enumerate(itertools.pairwise(points)):
+        if math.dist(a, b) < 1e-6:
+            raise broken_rule(f"{key}[{i + 1}]", list(b), f"a point different from {key}[{i}]")
+
+
+def _direction(heading: float | None, rate: float | None) -> list[float] | None:
+    if heading is None or rate is None:
+        return None
+    return [rate * math.cos(heading), rate * math.sin(heading)]
+
+
+class ProfileSection(Section):
+    """A speed to follow along the path: linear between places, constant before and after them."""
+
+    places: tuple[NonNegative, ...] = Field(
+        description="path parameter, m, increasing, up to the path's length", min_length=1
+    )
+    speeds: tuple[NonNegative, ...] = Field(description="m/s, one a place")
+    manner: Literal["below", "least_squares"] = Field(
+        "below", description="nowhere faster; or closest in the least-squares sense"
+    )
+
+    @model_validator(mode="after")
+    def _matching(self) -> Self:
+        try:
+            SpeedProfile(self.places, self.speeds)
+        except ArgumentError as error:
+            raise broken_rule(error.argument.split(".")[-1], error.value, error.expected) from None
+        return self
+
+    @property
+    def bound(self) -> SpeedProfile:
+        return SpeedProfile(self.places, self.speeds)
+
+
+def inlined(path: PathSection, folder: FilePath) -> dict[str, Any]:
+    """Tables of the section with what its file holds, so that they stand alone."""
+    tables = path.model_dump(mode="json", exclude_none=True)
+    if path.file is not None:
+        points, headings = read_points(folder / path.file, path.heading == "free")
+        del tables["file"]
+        tables["points"] = [list(p) for p in points]
+        if headings is not None:
+            tables["headings"] = list(headings)
+    return tables

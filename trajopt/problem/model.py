@@ -1,0 +1,311 @@
+"""A problem: robot, scene and task in one file, read strictly.
+
+Lengths are metres, angles radians, times seconds; axes are right-handed (x forward, y left, yaw
+counter-clockwise). Per-wheel arrays are over ``robot.wheel_names``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Any, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from trajopt.arrays import Array
+from trajopt.errors import ArgumentError
+from trajopt.limits.limit import Limit
+from trajopt.paths.path import Path
+from trajopt.problem.extensions import SECTIONS, Climb, Encounters, Printed, entry, variant_entry
+from trajopt.problem.given import PathSection, ProfileSection, inlined
+from trajopt.problem.jobs import Job, job_of
+from trajopt.problem.limits import LimitsSection
+from trajopt.problem.robot import RobotSection, robot_of, robot_tables
+from trajopt.problem.surroundings import GroundSection, ObstacleSection, scene_of
+from trajopt.problem.task import ActuatorSection, Goal, ObjectiveSection, Space, Spline, Start
+from trajopt.robots.robot import Robot
+from trajopt.schema import Point3, Section, as_problem_error, broken_rule, set_key, validated
+from trajopt.world.ramp import lay_over
+from trajopt.world.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What the control points of a path are searched for: ``start`` and ``goal`` (x, y, yaw),
+    ``wheels`` (W,) wanted at the end (those that count are ``critical``, by position), ``free``
+    control values inside ``space``."""
+
+    start: Point3
+    goal: Point3
+    wheels: Array
+    critical: tuple[int, ...]
+    free: tuple[str, ...]
+    space: Space
+
+
+class Problem(Section):
+    """A whole problem: which sections are there decides what ``solve`` does (``job``).
+
+    ``source`` is the file it came from; ``replace`` makes changed copies.
+    """
+
+    title: str = Field(min_length=1)
+    infeasible: str | None = Field(
+        None, description="why no solution holds, where that is known", min_length=1
+    )
+    robot_section: RobotSection = Field(alias="robot")
+    ground: GroundSection
+    obstacles: tuple[ObstacleSection, ...] = ()
+    limits_section: LimitsSection = Field(alias="limits")
+    start: Start | None = None
+    goal: Goal | None = None
+    space: Space | None = None
+    spline: Spline | None = None
+    objective: ObjectiveSection = ObjectiveSection()  # type: ignore[call-arg]
+    actuator: ActuatorSection | None = None
+    path_section: PathSection | None = Field(None, alias="path")
+    profile: ProfileSection | None = None
+    climb: Climb = None
+    encounters: Encounters = None
+    printed: Printed = None
+    source: str = Field("<problem>", exclude=True, repr=False)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        _ = self.job, self.robot, self.scene
+        if not self.limits:
+            raise broken_rule("limits", {}, "at least one limit")
+        self._check_wheels()
+        if self.job.name == "search":
+            self._check_search()
+        if self.job.name == "path":
+            self._check_path()
+        for section in self.given & set(SECTIONS):
+            if hasattr(entry(section), "check"):
+                entry(section).check(self)
+        return self
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the files say the same: what follows from them is not compared."""
+        if not isinstance(other, Problem):
+            return NotImplemented
+        return self.tables() == other.tables()
+
+    # -- what the sections say -------------------------------------------------------------------
+
+    @property
+    def given(self) -> set[str]:
+        """Names of the sections that the file has."""
+        fields = type(self).model_fields
+        found = {fields[name].alias or name for name in self.model_fields_set - {"source"}}
+        return {name for name in found if self._value(name) not in (None, ())}
+
+    def _value(self, section: str) -> Any:
+        own = ("robot", "limits", "path")
+        return getattr(self, f"{section}_section" if section in own else section)
+
+    @cached_property
+    def job(self) -> Job:
+        """What ``solve`` does with it."""
+        return job_of(self.given)
+
+    @property
+    def folder(self) -> FilePath:
+        """Where files that the problem names are looked for."""
+        return FilePath(self.source).parent
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot that moves."""
+        return robot_of(self.robot_section.model_dump(mode="json"), self.folder)
+
+    @cached_property
+    def scene(self) -> Scene:
+        """Where it moves."""
+        try:
+            return scene_of(self.ground, self.obstacles)
+        except ArgumentError as error:
+            raise broken_rule("obstacles.name", error.value, error.expected) from None
+
+    @cached_property
+    def limits(self) -> tuple[Limit, ...]:
+        """What it keeps, the motors' limits included."""
+        asked = self.limits_section
+        found = asked.limits(self.robot, self.ground.friction)
+        if asked.variant is not None:
+            found += tuple(variant_entry(asked.variant).variant_limits(self))
+        return found
+
+    @cached_property
+    def flat_path(self) -> Path:
+        """The given path in the plane. Raises ArgumentError where none is given."""
+        if self.path_section is None:
+            raise ArgumentError("problem", self.title, "a problem with a given path, [path]")
+        return self.path_section.path(self.folder, self.robot.turning_length)
+
+    @cached_property
+    def path(self) -> Path:
+        """The given path, over the ramps where there are some."""
+        ramps = [ramp.ramp for ramp in self.ground.ramps]
+        return lay_over(self.flat_path, ramps) if ramps else self.flat_path
+
+    @cached_property
+    def search(self) -> Search:
+        """What is searched for. Raises ArgumentError where nothing is."""
+        start, goal, spline, space = self.start, self.goal, self.spline, self.space
+        if start is None or start.pose is None or goal is None or spline is None or space is None:
+            raise ArgumentError(
+                "problem", self.title, "a problem whose control points are searched"
+            )
+        wheels = np.zeros(len(self.robot.wheels)) if goal.wheels is None else np.array(goal.wheels)
+        return Search(start.pose, goal.pose, wheels, self.critical_indices, spline.free, space)
+
+    @property
+    def start_wheels(self) -> Array:
+        """(W,): wheel angles at the start, rad."""
+        wheels = None if self.start is None else self.start.wheels
+        return np.zeros(len(self.robot.wheels)) if wheels is None else np.array(wheels)
+
+    @property
+    def critical(self) -> tuple[str, ...]:
+        """Names of the wheels whose final angle counts."""
+        return () if self.goal is None or self.goal.critical is None else self.goal.critical
+
+    @property
+    def critical_indices(self) -> tuple[int, ...]:
+        """Their positions in per-wheel arrays."""
+        return tuple(self.robot.wheel_names.index(name) for name in self.critical)
+
+    # -- copies ------------------------------------------------------------------------------------
+
+    def tables(self) -> dict[str, Any]:
+        """The tables of its file."""
+        tables = self.model_dump(mode="json", exclude_none=True, by_alias=True)
+        if self.job.name != "search":
+            del tables["objective"]
+        return tables
+
+    def standalone(self) -> dict[str, Any]:
+        """The tables of a file that needs no other file of the user's."""
+        tables = self.tables()
+        if self.robot_section.file is not None:
+            tables["robot"] = robot_tables(tables["robot"], self.folder)
+        if self.path_section is not None:
+            tables["path"] = inlined(self.path_section, self.folder)
+        return tables
+
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **sections: Any) -> Problem:
+        """Copy with changes, checked like a file.
+
+        ``changes`` maps dotted keys to values ({"goal.wheels": [0, 0, 0, 0]}), None takes a key
+        out; keyword arguments name whole sections or parts of them (limits={"speed": 1.0}). Raises
+        ProblemError.
+        """
+        data = self.tables()
+        for key, value in (changes or {}).items():
+            change_key(data, key, value, self.source)
+        for name, value in sections.items():
+            if isinstance(value, Mapping) and isinstance(data.get(name), dict):
+                for key, part in value.items():
+                    change_key(data, f"{name}.{key}", part, self.source)
+            else:
+                change_key(data, name, value, self.source)
+        return validated(Problem, data, self.source)
+
+    # -- checks ------------------------------------------------------------------------------------
+
+    def _check_wheels(self) -> None:
+        names = self.robot.wheel_names
+        for section in ("start", "goal"):
+            wheels = getattr(getattr(self, section), "wheels", None)
+            if wheels is not None and len(wheels) != len(names):
+                expected = f"{len(names)} angles, one a wheel that rolls ({', '.join(names)})"
+                raise broken_rule(f"{section}.wheels", list(wheels), expected)
+        for name in self.critical:
+            if name not in names:
+                raise broken_rule("goal.critical", name, "wheels among " + ", ".join(names))
+        # With pose and heading given a path chooses two numbers: the body's displacement along its
+        # own axes, summed on the way. Wheels whose rows are dependent turn together.
+        rows = self.robot.inverse[list(self.critical_indices), :2]
+        if np.linalg.matrix_rank(rows, tol=1e-9 * np.abs(self.robot.inverse).max()) < len(rows):
+            expected = (
+                "wheels that turn independently of one another: at most two, whose rolling rows "
+                "differ (with four Mecanum wheels not two that are diagonally opposite)"
+            )
+            raise broken_rule("goal.critical", list(self.critical), expected)
+
+    def _check_search(self) -> None:
+        if self.start is not None and self.start.pose is None:
+            raise broken_rule("start.pose", None, "x, y, yaw of the start")
+        task = self.search
+        space = task.space
+        others = [wheel.name for wheel in self.robot.rolling if wheel.kind != "swedish"]
+        if others or not self.robot.holonomic:
+            expected = (
+                "a robot whose rolling wheels are all Swedish and that moves in every direction, "
+                f"for a searched spline; '{self.robot.name}' has {', '.join(others) or 'too few'}; "
+                "others can be given their [path]"
+            )
+            raise broken_rule("robot.name", self.robot.name, expected)
+        for name, pose in (("start", task.start), ("goal", task.goal)):
+            if not space.contains(pose[0], pose[1]):
+                expected = f"a position inside space x {list(space.x)}, y {list(space.y)}"
+                raise broken_rule(f"{name}.pose", list(pose), expected)
+        if math.dist(task.start[:2], task.goal[:2]) < 1e-6:
+            raise broken_rule("goal.pose", list(task.goal), "a position different from start.pose")
+        if self.ground.ramps:
+            expected = "none: a searched spline has a heading of its own, which needs level ground"
+            raise broken_rule("ground.ramps", len(self.ground.ramps), expected)
+        kind = self.objective.kind
+        if kind == "terminal" and not self.critical and self.actuator is None:
+            expected = (
+                '"duration": without goal.critical every path ends at the goal, and the terminal '
+                "cost is always 0"
+            )
+            raise broken_rule("objective.kind", kind, expected)
+        if kind == "duration" and self.actuator is not None:
+            expected = (
+                'none with objective.kind = "duration": a time-scaled motion keeps wheel speeds '
+                "within limits, so no drive saturates"
+            )
+            raise broken_rule("actuator", "given", expected)
+        if "duration" in task.free and self.actuator is None:
+            expected = (
+                "no duration without [actuator]: drives that follow end at the same angles "
+                "whatever the duration, and time scaling chooses it"
+            )
+            raise broken_rule("spline.free", list(task.free), expected)
+
+    def _check_path(self) -> None:
+        if self.start is not None and self.start.pose is not None:
+            expected = "none: the path starts at its first point"
+            raise broken_rule("start.pose", list(self.start.pose), expected)
+        assert self.path_section is not None
+        if self.path_section.heading == "free" and not self.robot.holonomic:
+            expected = f"\"along\": '{self.robot.name}' cannot move in every direction"
+            raise broken_rule("path.heading", "free", expected)
+        try:
+            length = self.path.length
+        except ArgumentError as error:
+            raise broken_rule(f"path.{error.argument}", error.value, error.expected) from None
+        if self.profile is not None and self.profile.places[-1] > length * (1 + 1e-6):
+            expected = f"path parameters up to the path's length, {length:.6g} m"
+            raise broken_rule("profile.places", list(self.profile.places), expected)
+
+
+def change_key(data: dict[str, Any], dotted: str, value: Any, file: str) -> None:
+    """``set_key`` in the tables of a problem; a key of the robot that is taken out is one of its
+    own file, so the whole robot then stands in the tables."""
+    section = data.get("robot")
+    deep = dotted.startswith("robot.") and dotted.count(".") > 1
+    if value is None and deep and isinstance(section, dict):
+        try:
+            data["robot"] = robot_tables(section, FilePath(file).parent)
+        except PydanticCustomError as error:
+            raise as_problem_error(error, file) from None
+    set_key(data, dotted, value, file)

@@ -1,0 +1,127 @@
+"""What is asked: start, goal, the room for it, the spline that is searched and its objective."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from trajopt.robots.actuator import Actuator
+from trajopt.schema import NonNegative, Point, Point3, Positive, Section, broken_rule
+
+FreeVariable = Literal["p1", "p2", "heading", "duration"]
+
+
+class Start(Section):
+    """Where the motion starts, at rest."""
+
+    pose: Point3 | None = Field(
+        None, description="x, y, yaw: m, m, rad; a given path has its own, so not with [path]"
+    )
+    wheels: tuple[float, ...] | None = Field(
+        None, description="wheel angles, one a wheel that rolls, rad; absent: zeros"
+    )
+
+
+class Goal(Section):
+    """Where it ends; the final angles of the critical wheels count."""
+
+    pose: Point3 = Field(description="x, y, yaw: m, m, rad")
+    wheels: tuple[float, ...] | None = Field(
+        None, description="wanted wheel angles, one a wheel that rolls, rad"
+    )
+    critical: tuple[str, ...] | None = Field(
+        None,
+        description="names of the wheels whose final angle counts; with wheels, else neither",
+        min_length=1,
+    )
+
+    @model_validator(mode="after")
+    def _both_or_none(self) -> Self:
+        if (self.wheels is None) != (self.critical is None):
+            missing = "wheels" if self.wheels is None else "critical"
+            raise broken_rule(missing, None, "wheels and critical both given or both left out")
+        if self.critical is not None and len(set(self.critical)) < len(self.critical):
+            raise broken_rule("critical", list(self.critical), "each wheel once")
+        return self
+
+
+class Space(Section):
+    """A rectangle: searched control points stay inside; so does the outline where a step is
+    climbed."""
+
+    x: Point = Field(description="from, to, m")
+    y: Point = Field(description="from, to, m")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for axis in ("x", "y"):
+            low, high = getattr(self, axis)
+            if not low < high:
+                raise broken_rule(axis, [low, high], "an interval [from, to] with from < to")
+        return self
+
+    def contains(self, x: float, y: float) -> bool:
+        return self.x[0] <= x <= self.x[1] and self.y[0] <= y <= self.y[1]
+
+
+class Spline(Section):
+    """Natural cubic spline through start, P1, P2, goal; which of its control values are
+    searched."""
+
+    free: tuple[FreeVariable, ...] = Field(min_length=1, description="searched control values")
+
+    @model_validator(mode="after")
+    def _once(self) -> Self:
+        if len(set(self.free)) != len(self.free):
+            raise broken_rule("free", list(self.free), "each name once")
+        if set(self.free) == {"duration"}:
+            raise broken_rule("free", list(self.free), "at least one of p1, p2, heading")
+        return self
+
+
+class ObjectiveSection(Section):
+    """Terminal cost of thesis 000, Table 4.4, or the duration that time scaling needs."""
+
+    kind: Literal["terminal", "duration"] = "terminal"
+    pose_gains: tuple[NonNegative, NonNegative, NonNegative] = Field(
+        (3.0, 0.125, 2.5), description="on |dx|, |dy| (1/m), |dyaw| (1/rad): Table 5.8"
+    )
+    wheel_gain: NonNegative = Field(
+        12.5, description="on each critical wheel's deviation, 1/rad: Table 5.8"
+    )
+    wheel_period: Literal["2pi", "pi"] = Field(
+        "2pi", description="2pi: the tables; pi: hubs half a turn apart"
+    )
+    wheel_tolerance: Positive = Field(1e-3, description="rad; a solution holds within it; chosen")
+    pose_tolerance: Positive = Field(
+        1e-3, description="m and rad; a solution holds within it; chosen"
+    )
+
+    @property
+    def period(self) -> float:
+        """Period of the wheel angle, rad."""
+        return 2 * math.pi if self.wheel_period == "2pi" else math.pi
+
+
+class ActuatorSection(Section):
+    """Drives that saturate and have a dead zone: the search predicts through them, at uniform
+    spline speed in a nominal duration. Without this section drives follow and motions are
+    time-scaled."""
+
+    duration: Positive = Field(description="nominal, of the motion, s")
+    saturation: Positive = Field(description="rad/s")
+    dead_zone: NonNegative = Field(description="rad/s")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.dead_zone >= self.saturation:
+            raise broken_rule(
+                "dead_zone", self.dead_zone, f"a speed below saturation = {self.saturation} rad/s"
+            )
+        return self
+
+    @property
+    def drive(self) -> Actuator:
+        return Actuator(self.saturation, self.dead_zone)

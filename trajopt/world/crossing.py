@@ -1,0 +1,100 @@
+"""Where a robot's outline meets what stands on the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import shapely
+
+from trajopt.arrays import Array, rotation
+from trajopt.paths.path import Path
+from trajopt.world.obstacles import Obstacle
+
+SPACING = 0.005  # m of path parameter between places that are looked at; chosen
+_INSIDE = "T********"  # of shapely: the interiors meet, a touch is none
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Between path parameters ``start`` and ``end`` (m) the outline is inside ``obstacle``, at most
+    by ``depth`` (m: its farthest corner from the obstacle's border)."""
+
+    obstacle: str
+    start: float
+    end: float
+    depth: float
+
+    def __str__(self) -> str:
+        return (
+            f"the outline crosses '{self.obstacle}' from s = {self.start:.3f} to {self.end:.3f} m, "
+            f"by up to {self.depth:.3f} m"
+        )
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Obstacles as ground that a ``footprint`` (K, 2), m, body frame, keeps off."""
+
+    footprint: tuple[tuple[float, float], ...]
+    obstacles: tuple[Obstacle, ...]
+
+    @cached_property
+    def _solids(self) -> list[shapely.Polygon]:
+        return [shapely.Polygon(thing.outline) for thing in self.obstacles]
+
+    def margin(self, x: Array, y: Array, yaw: Array) -> Array:
+        """Distance (m) of the outline from the nearest obstacle at poses of any shape, or less
+        where it is farther than the outline's reach; where it crosses one, minus the depth."""
+        places, angles = np.stack([np.ravel(x), np.ravel(y)], axis=1), np.ravel(yaw)
+        reach = float(np.hypot(*np.transpose(self.footprint)).max())
+        least = np.full(len(places), np.inf)
+        for solid in self._solids:
+            distance = shapely.distance(solid, shapely.points(places)) - reach
+            near = np.flatnonzero(distance < 0.0)
+            outlines = shapely.polygons(outlines_at(places[near], angles[near], self.footprint))
+            distance[near] = shapely.distance(solid, outlines)
+            for i in np.flatnonzero(distance[near] <= 0.0):
+                distance[near[i]] = -_depth(shapely.intersection(solid, outlines[i]), solid)
+            least = np.minimum(least, distance)
+        return least.reshape(np.shape(x))
+
+    def rooms(self, x: Any, y: Any, yaw: Any) -> list[Any]:  # noqa: ARG002 - ground has it
+        """None: an obstacle is no row of a smooth program."""
+        return []
+
+
+def crossings(
+    path: Path, footprint: Sequence[tuple[float, float]], obstacles: Sequence[Obstacle]
+) -> tuple[Crossing, ...]:
+    """Every stretch of a path on which the outline crosses an obstacle, obstacle by obstacle."""
+    if not obstacles:
+        return ()
+    s = np.linspace(0.0, path.length, max(int(np.ceil(path.length / SPACING)), 1) + 1)
+    u = path.locate(s)
+    outlines = shapely.polygons(outlines_at(path.position(u)[:, :2], path.yaw(u), footprint))
+    found = []
+    for thing in obstacles:
+        solid = shapely.Polygon(thing.outline)
+        inside = shapely.relate_pattern(solid, outlines, _INSIDE)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
+        for first, after in zip(edges[::2], edges[1::2], strict=True):
+            common = shapely.intersection(solid, outlines[first:after])
+            depth = _depth(common, solid)
+            found.append(Crossing(thing.name, float(s[first]), float(s[after - 1]), depth))
+    return tuple(found)
+
+
+def outlines_at(places: Array, yaw: Array, footprint: Sequence[tuple[float, float]]) -> Array:
+    """(N, K, 2): corners of an outline at places (N, 2) and yaws (N,)."""
+    turned = np.asarray(footprint, dtype=np.float64) @ np.swapaxes(rotation(yaw), -1, -2)
+    return np.asarray(turned + places[:, None, :])
+
+
+def _depth(common: Any, solid: shapely.Polygon) -> float:
+    """Largest distance (m) of a corner of the common parts from the border of ``solid``."""
+    corners = shapely.points(shapely.get_coordinates(common))
+    return float(np.max(shapely.distance(solid.exterior, corners), initial=0.0))
