@@ -48,7 +48,7 @@ from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.pareto import ParetoFront, pareto_front
 from trajopt.optimize.pso import thesis_enhanced, thesis_first
 from trajopt.optimize.search import minimize, optimizer_names
-from trajopt.report.platform_picture import platform_figure
+from trajopt.report.robot_picture import robot_figure
 from trajopt.report.style import in_style, save_figure
 from trajopt.robots.mobility import mobility_of
 from trajopt.systems.asoc.design import TERMS, AsocDesign, Model, best_width, full_factorial
@@ -455,7 +455,7 @@ def draw(
             GEOMETRY.offset * twist[2] / np.linalg.norm(links, axis=1)
         )  # modules at rest against the body
         save_figure(
-            platform_figure(
+            robot_figure(
                 asoc_robot(GEOMETRY), steering=wheel_steering(GEOMETRY, trailing), twist=twist
             ),
             FIGURES / "platform.png",

@@ -8,7 +8,7 @@ import sys
 import typer
 from rich.console import Console
 
-from trajopt.cli import bench, paths, search, sweep
+from trajopt.cli import bench, paths, robot, search, sweep
 from trajopt.errors import TrajoptError
 from trajopt.systems.smdw import commands
 
@@ -27,6 +27,7 @@ for command in (
     paths.export,
     paths.compare,
     search.schema,
+    robot.robot,
     sweep.report,
 ):
     app.command()(command)

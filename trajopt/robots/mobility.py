@@ -117,16 +117,17 @@ def mobility_of(robot: Robot) -> Mobility:
     """
     if robot.description.skid is not None:
         return Mobility(2, 0)
-    fixed = _sliding([(w, w.beta) for w in robot.wheels], (WheelKind.FIXED,))
-    basis = null_space(fixed)
-    if basis.shape[1] == 0:
+    fixed = _rank(_sliding([(w, w.beta) for w in robot.wheels], (WheelKind.FIXED,)))
+    if fixed == 3:
         return Mobility(0, 0)
-    generic = (
-        basis @ np.array([1.0, 0.618, 0.414])[: basis.shape[1]]
-    )  # a twist without special symmetry
-    angles = steering_for(robot, generic)
-    every = _sliding(zip(robot.wheels, angles, strict=True), _SLIDE)
-    return Mobility(3 - _rank(every), _rank(every) - _rank(fixed))
+    every = _rank(_sliding(zip(robot.wheels, generic_steering(robot), strict=True), _SLIDE))
+    return Mobility(3 - every, every - fixed)
+
+
+def generic_steering(robot: Robot) -> Array:
+    """(W,): steering angles (rad) for a motion without special symmetry that fixed wheels allow."""
+    basis = null_space(_sliding([(w, w.beta) for w in robot.wheels], (WheelKind.FIXED,)))
+    return steering_for(robot, basis @ np.array([1.0, 0.618, 0.414])[: basis.shape[1]])
 
 
 def steering_for(robot: Robot, twist: ArrayLike) -> Array:

@@ -25,6 +25,7 @@ from trajopt.schema import read_tables, set_key, validated
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
 DATA = Path(__file__).parent / "data"  # the shipped robots
+_AROUND = 48  # directions of a wheel that turns, for the outline; a multiple of 4
 _RANK = 1e-9  # singular values below this share of the largest count as zero
 
 
@@ -165,10 +166,16 @@ class Robot:
         if section.footprint is not None:
             return section.footprint
         (px, py), (length, width, _) = section.chassis_place, section.chassis
-        points = [(px + i * length / 2, py + j * width / 2) for i in (-1, 1) for j in (-1, 1)]
-        points += [p for wheel in self.description.wheels for p in _outline(wheel)]
-        (x0, y0), (x1, y1) = np.min(points, axis=0).tolist(), np.max(points, axis=0).tolist()
+        box = [(px + i * length / 2, py + j * width / 2) for i in (-1, 1) for j in (-1, 1)]
+        points = np.vstack([np.array(box), *self.reached.values()])
+        (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
         return ((x1, y1), (x0, y1), (x0, y0), (x1, y0))
+
+    @property
+    def reached(self) -> dict[str, Array]:
+        """(K, 2) a wheel, by name: places seen from above that it reaches when it turns, m."""
+        turns = {name: group.range for group in self.description.steering for name in group.wheels}
+        return {w.name: outline(w, turns.get(w.name)) for w in self.description.wheels}
 
     # -- kinematics --------------------------------------------------------------------------------
 
@@ -322,15 +329,23 @@ def kinematic(wheel: WheelSection) -> Wheel:
     )
 
 
-def _outline(wheel: WheelSection) -> list[tuple[float, float]]:
-    """Corners of a wheel seen from above, at every steering angle where it turns, m."""
-    if wheel.kind in ("steered", "castor"):
-        x, y = wheel.position
+def outline(wheel: WheelSection, turns: tuple[float, float] | None) -> Array:
+    """(K, 2): places that a wheel reaches seen from above, m. A steered wheel ``turns`` from, to
+    (rad); without, it turns all round as a castor does."""
+    x, y = wheel.position
+    if wheel.kind in ("steered", "castor") and turns is None:
         reach = math.hypot(wheel.trail + wheel.radius, abs(wheel.lateral) + wheel.width / 2)
-        return [(x + i * reach, y + j * reach) for i in (-1, 1) for j in (-1, 1)]
-    (x, y), cos, sin = wheel.contact, math.cos(wheel.angle), math.sin(wheel.angle)
-    corners = [(i * wheel.radius, j * wheel.width / 2) for i in (-1, 1) for j in (-1, 1)]
-    return [(x + a * cos - b * sin, y + a * sin + b * cos) for a, b in corners]
+        around = 2 * np.pi / _AROUND * np.arange(_AROUND)
+        return np.column_stack([x + reach * np.cos(around), y + reach * np.sin(around)])
+    low, high = (0.0, 0.0) if turns is None else turns
+    angle = wheel.angle + np.linspace(low, high, _AROUND)[:, None]
+    ahead = np.array([1, 1, -1, -1]) * wheel.radius
+    left = np.array([1, -1, 1, -1]) * wheel.width / 2
+    corners = [
+        x + ahead * np.cos(angle) - left * np.sin(angle),
+        y + ahead * np.sin(angle) + left * np.cos(angle),
+    ]
+    return np.stack(corners, axis=-1).reshape(-1, 2)
 
 
 def _builder(name: str) -> Any:

@@ -9,7 +9,7 @@ from benchmarks.theses.asoc_tables import mobility, table_5
 from benchmarks.theses.asoc_tables_tracking import QUICK, difference, interval
 from benchmarks.theses.textbook import TEXTBOOK
 from trajopt.errors import ArgumentError
-from trajopt.report.platform_picture import platform_figure
+from trajopt.report.robot_picture import robot_figure
 from trajopt.report.style import save_figure
 from trajopt.robots.mobility import steering_for
 from trajopt.systems.asoc.pictures import (
@@ -25,21 +25,21 @@ from trajopt.systems.asoc.pictures import (
 def test_every_platform_can_be_drawn_with_its_centre(name, tmp_path) -> None:
     platform = TEXTBOOK[name]
     twist = [0.5, 0.0, 0.6]
-    figure = platform_figure(platform, steering=steering_for(platform, twist), twist=twist)
+    figure = robot_figure(platform, steering=steering_for(platform, twist), twist=twist)
     assert save_figure(figure, tmp_path / "a.png").stat().st_size > 5000
     marks = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
     assert [float(marks[0].get_xdata()[0]), float(marks[0].get_ydata()[0])] == pytest.approx(
         [0.0, 0.5 / 0.6]
     )
-    straight = platform_figure(platform, twist=[1.0, 0.0, 0.0])
+    straight = robot_figure(platform, twist=[1.0, 0.0, 0.0])
     assert any("infinity" in text.get_text() for text in straight.axes[0].texts)
 
 
 def test_wrong_shapes_are_refused() -> None:
     with pytest.raises(ArgumentError):
-        platform_figure(TEXTBOOK["bicycle"], steering=[0.0])
+        robot_figure(TEXTBOOK["bicycle"], steering=[0.0])
     with pytest.raises(ArgumentError):
-        platform_figure(TEXTBOOK["bicycle"], twist=[0.0])
+        robot_figure(TEXTBOOK["bicycle"], twist=[0.0])
 
 
 def test_figures_hold_what_they_are_given() -> None:

@@ -1,0 +1,92 @@
+"""``trajopt robot``: what a described robot is, what its wheels allow, what is wrong with it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich import box
+from rich.table import Table
+
+from trajopt.cli.shared import FAULTY, Overrides, console, overrides
+from trajopt.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from trajopt.robots import Robot
+
+
+def robot(
+    name: Annotated[
+        str | None,
+        typer.Argument(
+            help="robot file (*.toml) or name of a shipped robot; without: lists these",
+            show_default=False,
+        ),
+    ] = None,
+    set_: Overrides = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="file for a view from above (*.png)")
+    ] = None,
+) -> None:
+    """What a robot is: wheels, mobility, checks, and a view from above."""
+    from trajopt.robots import Robot, robot_names
+    from trajopt.robots import robot as shipped
+    from trajopt.robots.checks import findings
+
+    if name is None:
+        if set_ or out is not None:
+            raise ArgumentError("robot", None, "a file or a shipped name, for --set and --out")
+        _list([shipped(known) for known in robot_names()])
+        return
+    changes = overrides(set_)
+    file = name.endswith(".toml") or "/" in name
+    found = Robot.load(name, changes) if file else shipped(name, changes)
+    _describe(found)
+    faults = False
+    for finding in findings(found):
+        mark = "[red]fault:[/red] " if finding.fault else ""
+        console.print(f"{mark}{finding.about}: {finding.text}", highlight=False)
+        faults |= finding.fault
+    if out is not None:
+        from trajopt.report.robot_picture import save_robot_picture
+
+        console.print(
+            f"written to {save_robot_picture(found, out)}", highlight=False, soft_wrap=True
+        )
+    if faults:
+        raise typer.Exit(FAULTY)
+
+
+def _list(robots: list[Robot]) -> None:
+    from trajopt.robots.mobility import mobility_of
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in ("robot", "kg", "wheels", "mobility, steerability", "about"):
+        table.add_column(column, justify="right" if column == "kg" else "left")
+    for one in robots:
+        degrees = mobility_of(one)
+        allowed = f"{degrees.mobility}, {degrees.steerability}"
+        about = one.description.about
+        table.add_row(one.name, f"{one.body.mass:g}", _wheels(one), allowed, about)
+    console.print(table)
+
+
+def _describe(robot: Robot) -> None:
+    from trajopt.robots.mobility import mobility_of
+
+    degrees, size = mobility_of(robot), robot.description
+    console.print(f"[bold]{robot.name}[/bold]: {size.about or 'no description'}", highlight=False)
+    lines = [
+        f"{size.body.mass:g} kg, wheels: {_wheels(robot)}; driven: "
+        + (", ".join(robot.driven) or "none"),
+        f"mobility {degrees.mobility}, steerability {degrees.steerability}, manoeuvrability "
+        f"{degrees.manoeuvrability}" + (" (skid steering)" if size.skid else ""),
+    ]
+    for line in lines:
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def _wheels(robot: Robot) -> str:
+    kinds = ["double" if wheel.double else wheel.kind for wheel in robot.description.wheels]
+    return ", ".join(f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds))
