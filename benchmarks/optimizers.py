@@ -1,4 +1,4 @@
-"""All optimizers on all problems of the SMDW thesis, under one budget, scored by the objective
+"""All optimizers on all problems of [guzman2015], under one budget, scored by the objective
 itself.
 
 Run as ``python -m benchmarks.optimizers``. ``--quick`` takes fewer evaluations, seeds and starts.
@@ -29,7 +29,7 @@ from trajopt.systems.smdw.thesis import DURATIONS, through_drives
 
 PACKAGES = ("trajopt", "numpy", "scipy", "numba", "casadi", "pyswarms")
 EQUAL = 1e-9  # costs below this count as equal, chosen: exact to rounding
-PARTICLES, ITERATIONS = 50, 500  # thesis 000, Table 5.8
+PARTICLES, ITERATIONS = 50, 500  # [guzman2015], Table 5.8
 PYSWARMS_OPTIONS = {
     "c1": 0.5,
     "c2": 0.3,

@@ -1,4 +1,5 @@
-"""Counts lines of code of Python files: without blank lines, comments and docstrings (`make lines`)."""
+"""Counts lines of code of Python files: without blank lines, comments and docstrings (`make
+lines`)."""
 
 from __future__ import annotations
 

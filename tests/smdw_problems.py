@@ -12,6 +12,6 @@ SMDW = sorted(DURATIONS)
 
 
 def smdw_problem(name: str) -> Problem:
-    """A problem of thesis 000 by file name, with drives that follow."""
+    """A problem of [guzman2015] by file name, with drives that follow."""
     changes = {"actuator": None, "infeasible": None}
     return load_problem(ROOT / f"problems/smdw/{name}.toml", changes)

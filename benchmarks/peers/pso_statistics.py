@@ -1,10 +1,10 @@
 """gbest PSO with constriction against pyswarms's, everything equal that pyswarms lets one set.
 
-Run as ``python -m benchmarks.peers.pso_statistics``. Equal: coefficients, swarm size, iterations, bounds,
-uniform start, velocities of zero, positions mirrored at the bounds, no clamping. Not equal: the
-random numbers. A second table has our default, which also reverses the velocity of a particle that
-was mirrored. Costs after 50 x 500 evaluations are compared by the one-sided rank-sum test (is ours
-worse?) with Holm's correction over the functions.
+Run as ``python -m benchmarks.peers.pso_statistics``. Equal: coefficients, swarm size, iterations,
+bounds, uniform start, velocities of zero, positions mirrored at the bounds, no clamping. Not equal:
+the random numbers. A second table has our default, which also reverses the velocity of a particle
+that was mirrored. Costs after 50 x 500 evaluations are compared by the one-sided rank-sum test (is
+ours worse?) with Holm's correction over the functions.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Speed of swarm evaluation and of the whole PSO search, beside NumPy, pyswarms and pymoo.
 
-Run as ``python -m benchmarks.peers.swarm_speed``. ``--quick`` repeats less. Each figure is the least of
-several repeats in CPU time of this process on one thread, which other load on the machine disturbs
-little.
+Run as ``python -m benchmarks.peers.swarm_speed``. ``--quick`` repeats less. Each figure is the
+least of several repeats in CPU time of this process on one thread, which other load on the machine
+disturbs little.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.thesis import through_drives
 
 PACKAGES = ("trajopt", "numpy", "numba", "pyswarms", "pymoo")
-PARTICLES, ITERATIONS = 50, 500  # thesis 000, Table 5.8
+PARTICLES, ITERATIONS = 50, 500  # [guzman2015], Table 5.8
 OVERHEAD = (40, 20, 500)  # particles, dimension, iterations
-EQUAL = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # Clerc and Kennedy 2002
+EQUAL = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # [clerc2002]
 MINIMUM = {
     "numpy": 20.0,
     "numpy, heading free": 20.0,

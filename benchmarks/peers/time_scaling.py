@@ -38,8 +38,8 @@ from trajopt.timing.toppra import toppra_profile
 
 FIGURES = OUT / "time_scaling"
 PACKAGES = ("trajopt", "numpy", "numba", "toppra", "copp-py")
-POINTS = 1001  # TARGETS: 1,001 points
-BATCH, BATCH_POINTS = 4000, 200  # TARGETS: 4,000 profiles of 200 points
+POINTS = 1001
+BATCH, BATCH_POINTS = 4000, 200  # profiles, points of each
 SIZES = (100, 300, 1000, 3000, 10_000, 30_000, 100_000)
 TOPPRA_UP_TO = 3000  # points; above, one run of toppra takes seconds
 SPEED, ACCELERATION = (1.0, 1.5), (2.0, 1.5)  # of the two coordinates, m/s and m/s^2; chosen

@@ -1,4 +1,4 @@
-"""Numbers printed in thesis 001 (active split offset casters), for comparison only."""
+"""Numbers printed in [udengaard2008] (active split offset casters), for comparison only."""
 
 from __future__ import annotations
 

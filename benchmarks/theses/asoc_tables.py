@@ -1,8 +1,8 @@
-"""Thesis 001 (active split offset casters) reproduced: tables and figures, printed values beside
-ours.
+"""[udengaard2008] (active split offset casters) reproduced: tables and figures, printed values
+beside ours.
 
-Run as ``python -m benchmarks.theses.asoc_tables``. ``--quick`` takes coarser quadrature, fewer seeds and
-no physics.
+Run as ``python -m benchmarks.theses.asoc_tables``. ``--quick`` takes coarser quadrature, fewer
+seeds and no physics.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def mobility() -> ResultTable:
         m = mobility_of(robot)
         rows.append((name, str(m.mobility), str(m.steerability), str(m.manoeuvrability)))
     return ResultTable(
-        "Mobility of the textbook robots (lecture 003)",
+        "Mobility of the textbook robots",
         ("robot", "mobility", "steerability", "manoeuvrability"),
         rows,
     )

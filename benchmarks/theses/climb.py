@@ -1,5 +1,5 @@
-"""How often planned approaches climb: `python -m benchmarks.theses.climb [--quick] [--engine E] [--trials
-N] [--parts ...]`.
+"""How often planned approaches climb: `python -m benchmarks.theses.climb [--quick] [--engine E]
+[--trials N] [--parts ...]`.
 
 Parts: ``planned`` starts sub-test 2 at the states that three planners reach (exact lattice at the
 middle of the window, the thesis's PSO aiming at its own 0, uniform random wheel angles); ``driven``
@@ -55,7 +55,7 @@ from trajopt.systems.smdw.trials import (
 FILES = {0.035: "step_3_5cm.toml", 0.05: "step_5cm.toml"}
 NAMES = {"lateral left": "lateral", "forward -35 deg": "forward35", "forward -45 deg": "forward45"}
 SCENARIO = {0.035: 2, 0.05: 1}
-# Thesis 000, sections 6.1, 6.1.1, 6.2: climbs in 10 runs (scenario 1 for 5 cm; both scenarios for
+# [guzman2015], sections 6.1, 6.1.1, 6.2: climbs in 10 runs (scenario 1 for 5 cm; both scenarios for
 # 3.5 cm).
 THESIS = {
     ("lateral", 0.05): "0/10",

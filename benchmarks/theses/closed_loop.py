@@ -1,5 +1,5 @@
-"""How exactly approaches end with feedback: `python -m benchmarks.theses.closed_loop [--quick] [--trials
-N] [--engine E]`.
+"""How exactly approaches end with feedback: `python -m benchmarks.theses.closed_loop [--quick]
+[--trials N] [--engine E]`.
 
 Random initial wheel angles (known to the planner), start errors up to 1 cm and 1 deg (unknown),
 friction 0.6-1.0; pose measured at 20 Hz with 5 mm and 0.5 deg noise, or without noise. Every trial

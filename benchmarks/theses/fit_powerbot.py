@@ -1,4 +1,4 @@
-"""Fits the knots that thesis 004 only draws, and writes problems/powerbot/experiment_*.toml.
+"""Fits the knots that [waheed2006] only draws, and writes problems/powerbot/experiment_*.toml.
 
     python -m benchmarks.theses.fit_powerbot [--quick] [--write]
 
@@ -41,7 +41,7 @@ SLIDING_WEIGHT = {
     4: 10.0,
     5: 10.0,
 }  # chosen: it binds only without the safety speed (4 and 5)
-RAMP_LENGTH, RAMP_HEIGHT = 4.29, 0.45  # m, thesis 004, section 4.4
+RAMP_LENGTH, RAMP_HEIGHT = 4.29, 0.45  # m, [waheed2006], section 4.4
 RAMP_FOOT, RAMP_DIRECTION = (
     (-44.63, -30.4),
     math.radians(-91.0),
@@ -161,10 +161,10 @@ def toml(case: Case, x: Array) -> str:
     residuals = values / case.printed - 1
     row = case.row
     lines = [
-        f"# Thesis 004, experiment {case.number} (section 4). Knots between start and goal are only drawn: fitted",
-        "# by benchmarks/fit_powerbot.py to the printed length and unscaled maxima; what is left is in [printed].",
+        f"# [waheed2006], experiment {case.number} (section 4). Knots between start and goal are only drawn: fitted",
+        "# by benchmarks/theses/fit_powerbot.py to the printed length and unscaled maxima; what is left is in [printed].",
         "# Lengths m, angles rad; x, y as in the thesis's map, yaw counter-clockwise.",
-        f'title = "Thesis 004, experiment {case.number}"',
+        f'title = "PowerBot thesis, experiment {case.number}"',
         "",
         "[path]",
         "knots = [" + ", ".join(f"[{a:g}, {b:g}]" for a, b in knots) + "]  # inner ones fitted",

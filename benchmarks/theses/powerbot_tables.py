@@ -1,4 +1,4 @@
-"""Thesis 004 beside this package: tables of PowerBot's six experiments.
+"""[waheed2006] beside this package: tables of PowerBot's six experiments.
 
     python -m benchmarks.theses.powerbot_tables [--quick]
 

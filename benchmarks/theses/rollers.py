@@ -1,8 +1,8 @@
-"""Deviation from kinematics and speed of the roller-level simulators (SMDW thesis, section 5.3).
+"""Deviation from kinematics and speed of the roller-level simulators ([guzman2015], section 5.3).
 
-Run as ``python -m benchmarks.theses.rollers``: drives LOC8 5 m forward, lateral and diagonal at 1 to 5
-km/h, on Mecanum and SMDW wheels, with every roller shape, in every engine. ``--quick`` takes 3 km/h
-only.
+Run as ``python -m benchmarks.theses.rollers``: drives LOC8 5 m forward, lateral and diagonal at 1
+to 5 km/h, on Mecanum and SMDW wheels, with every roller shape, in every engine. ``--quick`` takes 3
+km/h only.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from trajopt.simulate.scene import Scene
 from trajopt.simulate.straight import DIRECTIONS, deviation, straight_command
 from trajopt.systems.smdw.loc8_model import roller_robot
 
-DISTANCE = 5.0  # m, SMDW thesis section 5.3
-SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0)  # km/h, SMDW thesis Table 5.1
+DISTANCE = 5.0  # m, [guzman2015] section 5.3
+SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0)  # km/h, [guzman2015] Table 5.1
 QUICK_SPEEDS = (3.0,)  # km/h, the thesis's climbing speed
 WHEELS = ("Mecanum", "SMDW")
 # A shape is called good where it stays within this share along and across in all its runs (chosen:

@@ -1,7 +1,7 @@
 """Pictures of the SMDW reproduction page, drawn from runs made here and from the trial files of
 other benchmarks.
 
-Counterparts of thesis 000: Figures 6.4 and 6.11 (sub-test 1), 6.6-6.8 and 6.13 (sub-test 2), 6.3
+Counterparts of [guzman2015]: Figures 6.4 and 6.11 (sub-test 1), 6.6-6.8 and 6.13 (sub-test 2), 6.3
 and 6.10 (set-ups), 4.10, 4.18 and 6.9 (wheel); climb rates, phase map and closed-loop endings.
 """
 

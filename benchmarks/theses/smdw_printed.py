@@ -1,5 +1,5 @@
-"""Climbs from the final states that the SMDW thesis prints: `python -m benchmarks.theses.smdw_printed
-[--engines E ...]`.
+"""Climbs from the final states that the SMDW thesis prints: `python -m
+benchmarks.theses.smdw_printed [--engines E ...]`.
 
 Its sub-test 2 started from the states of its Tables 6.2-6.4: 2 s at 8.5 rad/s against the step.
 Friction and the place of the edge are not printed, nor what its wheels look like in detail: this

@@ -1,7 +1,7 @@
 """Searches of the SMDW reproduction page: the thesis's two swarms and the exact planner, in numbers
 and pictures.
 
-Counterparts of thesis 000: Figures 5.15-5.22 (swarms), 5.23-5.25 (paths over time interval), 6.5
+Counterparts of [guzman2015]: Figures 5.15-5.22 (swarms), 5.23-5.25 (paths over time interval), 6.5
 and 6.12 (cost over the place of P2).
 """
 

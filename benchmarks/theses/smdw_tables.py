@@ -1,9 +1,10 @@
-"""The SMDW thesis's tables and figures beside our own runs: `python -m benchmarks.theses.smdw_tables
-[--quick]`.
+"""The SMDW thesis's tables and figures beside our own runs: `python -m
+benchmarks.theses.smdw_tables [--quick]`.
 
 Thesis, our re-run of its PSO (same options, sound actuator model), our exact planner; where they
-differ the page says why. Climb counts come from the trial files of `python -m benchmarks.theses.climb` and
-`benchmarks.theses.smdw_printed`, control from `python -m benchmarks.theses.closed_loop`.
+differ the page says why. Climb counts come from the trial files of `python -m
+benchmarks.theses.climb` and `benchmarks.theses.smdw_printed`, control from `python -m
+benchmarks.theses.closed_loop`.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Robots of the textbook (lecture 003), which only their wheels make; sizes are chosen: round numbers
-of a small indoor robot."""
+"""Robots of the textbook [wheels-lecture], which only their wheels make; sizes are chosen: round
+numbers of a small indoor robot."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def wheel(kind: str, x: float, y: float, **more: Any) -> dict[str, Any]:
 
 
 def planar(name: str, *wheels: Mapping[str, Any], **more: Any) -> Robot:
-    """A robot of 30 kg on ``wheels``, each driven, steered ones each by itself; its centre of gravity
-    lies in the middle of them. ``more`` are other tables."""
+    """A robot of 30 kg on ``wheels``, each driven, steered ones each by itself; its centre of
+    gravity lies in the middle of them. ``more`` are other tables."""
     named = [{"name": f"wheel-{i + 1}", **wheel} for i, wheel in enumerate(wheels)]
     x, y = (sum(wheel["position"][i] for wheel in wheels) / len(wheels) for i in (0, 1))
     each = [{"name": wheel["name"], "wheels": [wheel["name"]]} for wheel in named]

@@ -200,8 +200,8 @@ def test_halving_rule_promises_nothing(bend: Course) -> None:
 
 
 def test_safe_speed_closed_form() -> None:
-    """SOURCES 004: 0.51, 0.52, 0.54 m/s for 1.51, 1.70, 2.55 m/s^2; the thesis's 0.6 without
-    braking."""
+    """v T + v^2 / (2 d) = range: 0.51, 0.52, 0.54 m/s for 1.51, 1.70, 2.55 m/s^2; the thesis's 0.6
+    without braking."""
     for braking, speed in ((1.51, 0.51), (1.70, 0.52), (2.55, 0.54)):
         v = safe_speed(0.6, 1.0, braking)
         assert v == pytest.approx(speed, abs=0.006)

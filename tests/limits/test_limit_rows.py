@@ -21,11 +21,11 @@ from trajopt.paths.samples import sample_path
 from trajopt.robots.robot import STANDARD_GRAVITY, Body, Robot, robot
 
 G, NAN = STANDARD_GRAVITY, float("nan")
-MU, H, FRONT, REAR, TRACK = 0.332, 0.215, 0.132, 0.218, 0.2  # PowerBot-like: SOURCES 004
+MU, H, FRONT, REAR, TRACK = 0.332, 0.215, 0.132, 0.218, 0.2  # PowerBot-like, [waheed2006]
 
 
 def powerbot_like(cog: tuple[float, float, float] = (0.0, 0.0, H)) -> Robot:
-    """Origin at the centre of gravity by default, as the formulas of SOURCES 004 have it."""
+    """Origin at the centre of gravity by default, as the formulas of [waheed2006] have it."""
     size = {"radius": 0.12, "width": 0.05, "mass": 2.0}
     wheels = [
         {"name": name, "kind": "fixed", "position": [FRONT, y], **size}
@@ -63,8 +63,8 @@ TURNING = Path.through(
 
 @pytest.mark.parametrize(("degrees", "expected"), [(0, 2.55), (6, 3.56), (-6, 1.51)])
 def test_braking_limits_of_the_thesis_robot(degrees, expected):
-    """SOURCES 004: 2.55 flat, 3.56 uphill, 1.51 m/s^2 downhill (the thesis's own formula gives
-    2.70)."""
+    """The drive axle carries more when braking: 2.55 flat, 3.56 uphill, 1.51 m/s^2 downhill (the
+    thesis's own formula gives 2.70)."""
     samples = sample_path(slope_path(np.radians(degrees)), np.array([1.5]))
     rows = Slip(MU, sides=64).rows(samples, powerbot_like())
     slowing = rows.a < -1e-9

@@ -1,5 +1,5 @@
-"""An optimizer in one file that fits on a page is known everywhere by its name, and the package is not
-touched."""
+"""An optimizer in one file that fits on a page is known everywhere by its name, and the package is
+not touched."""
 
 from __future__ import annotations
 

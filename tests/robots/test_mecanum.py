@@ -1,4 +1,4 @@
-"""The Mecanum platform from Swedish rows against thesis 000's printed matrices."""
+"""The Mecanum platform from Swedish rows against [guzman2015]'s printed matrices."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from trajopt.robots.robot import robot
 from trajopt.robots.wheel import Wheel, WheelKind
 
 L, WHEEL_RADIUS = 0.376 + 0.316, 0.098  # m
-# Thesis 000, inverse kinematics as printed: y points right there, yaw is counter-clockwise.
+# [guzman2015], inverse kinematics as printed: y points right there, yaw is counter-clockwise.
 PRINTED = np.array([[1, 1, -L], [1, -1, L], [1, -1, -L], [1, 1, L]]) / WHEEL_RADIUS
 MIRROR = np.diag([1.0, -1.0, 1.0])  # y right <-> y left
 
@@ -23,7 +23,7 @@ def test_printed_inverse_is_ours_with_y_mirrored():
 
 
 def test_printed_forward_is_ours_with_y_mirrored():
-    # R/4 [[1,1,1,1],[1,-1,-1,1],[-1/L,1/L,-1/L,1/L]]; the scan garbles it, SOURCES restores it.
+    # R/4 [[1,1,1,1],[1,-1,-1,1],[-1/L,1/L,-1/L,1/L]]; the print garbles it.
     printed = (
         WHEEL_RADIUS / 4 * np.array([[1, 1, 1, 1], [1, -1, -1, 1], [-1 / L, 1 / L, -1 / L, 1 / L]])
     )
@@ -74,7 +74,7 @@ def test_impossible_wheels_are_rejected(arguments):
 
 
 def _integral(w, sat, dz):
-    """G of SOURCES: the antiderivative of the actuator's output."""
+    """The antiderivative of the actuator's output."""
     return max(min(abs(w), sat) ** 2 - dz**2, 0) / 2 + sat * max(abs(w) - sat, 0)
 
 

@@ -150,7 +150,7 @@ def test_two_fixed_wheels_that_are_not_parallel_cannot_drive() -> None:
 
 
 def test_mecanum_matrices_of_thesis_000() -> None:
-    """Thesis 000 has y to the right: its matrices equal ours under y -> -y."""
+    """[guzman2015] has y to the right: its matrices equal ours under y -> -y."""
     a, b, radius = 0.3, 0.25, 0.1
     total = a + b
     printed = np.array([[1, 1, -total], [1, -1, total], [1, -1, -total], [1, 1, total]]) / radius

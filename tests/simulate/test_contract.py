@@ -50,7 +50,7 @@ def test_ramp_starts_on_the_ground_at_its_foot_and_rises() -> None:
 
 
 def test_wheel_speeds_are_those_of_the_printed_matrix(mecanum_robot: SimRobot) -> None:
-    # SMDW thesis, section 1.4, in right-handed axes: FL = vx - vy - L wz, ... over R
+    # [guzman2015], section 1.4, in right-handed axes: FL = vx - vy - L wz, ... over R
     vx, vy, wz, arm, radius = 0.4, -0.7, 0.9, 0.376 + 0.316, 0.098
     expected = (
         np.array([vx - vy - arm * wz, vx + vy + arm * wz, vx + vy - arm * wz, vx - vy + arm * wz])

@@ -64,7 +64,8 @@ def test_clearance_lets_a_five_centimetre_step_under_the_outer_hub() -> None:
 
 
 def test_contact_offsets_of_the_thesis_follow_from_the_sizes_fitted_to_them() -> None:
-    # SMDW thesis, Figure 4.10: 4.63 cm at 30 deg, 3.49 cm at 60 deg; flat-faced cam, offset h'(phi)
+    # [guzman2015], Figure 4.10: 4.63 cm at 30 deg, 3.49 cm at 60 deg; flat-faced cam, offset
+    # h'(phi)
     sizes = replace(SIZES, radius=0.1029, minor_radius=0.0554)
     for degrees, printed in ((30.0, 0.0463), (60.0, 0.0349)):
         phi = math.radians(degrees)

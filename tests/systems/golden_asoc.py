@@ -1,4 +1,5 @@
-"""Golden figures of thesis 001 and lecture 003: every call into the package that they need."""
+"""Golden figures of [udengaard2008] and [wheels-lecture]: every call into the package that they
+need."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Golden figures of thesis 004: every call into the package that they need."""
+"""Golden figures of [waheed2006]: every call into the package that they need."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from trajopt.timing.linear import linear_factor
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 
-TIMED = (1, 2, 4, 5)  # PowerBot experiments that thesis 004 scales linearly
+TIMED = (1, 2, 4, 5)  # PowerBot experiments that [waheed2006] scales linearly
 VARIANTS: tuple[Literal["thesis", "physical"], ...] = ("thesis", "physical")
 SLOPES = (0.0, 5.99, -5.99)  # deg; experiment 4's ramp
 

@@ -1,4 +1,4 @@
-"""Golden figures of thesis 000: every call into the package that they need."""
+"""Golden figures of [guzman2015]: every call into the package that they need."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ STEPS = ("step_5cm", "step_3_5cm")
 
 
 def smdw_costs() -> Figures:
-    """Costs decoded from the deviations and final states that thesis 000 prints."""
+    """Costs decoded from the deviations and final states that [guzman2015] prints."""
     found = {}
     for table, key, named in (
         ("table_5_5_time_interval", "time_s", "Table 5.5, T = {} s"),

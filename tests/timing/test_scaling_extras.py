@@ -88,7 +88,7 @@ def test_segments_lie_between_linear_and_the_optimum():
 
 
 def test_segment_factors_follow_a_given_profile():
-    """Thesis 004, eq. 2.40: the factor is the largest ratio of actual and specified speed in the
+    """[waheed2006], eq. 2.40: the factor is the largest ratio of actual and specified speed in the
     segment."""
     path = Path.through([[0, 0], [2, 0], [3, 0], [6, 0]], knots=[0.0, 1.0, 2.0, 3.0])
     profile = limit("speed_profile", places=(0.0, 6.0), speeds=(0.5, 2.0))
@@ -101,7 +101,8 @@ def test_segment_factors_follow_a_given_profile():
 
 
 def test_linear_factor_reproduces_the_printed_durations():
-    """SOURCES 004: T = segments * factor; the largest of the three ratios decides."""
+    """[waheed2006], eqs. 2.34 to 2.39: T = segments * factor; the largest of the three ratios
+    decides."""
     assert (
         linear_factor(2.0, 1.0, 1.0, speed_limit=1.0, acceleration_limit=1.0, braking_limit=1.0)
         == 2.0

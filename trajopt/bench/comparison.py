@@ -70,7 +70,7 @@ class BenchPlan:
     problems: tuple[str, ...]
     optimizers: tuple[str, ...]
     seeds: int = 15
-    evaluations: int = 25_000  # 50 particles x 500 iterations, thesis 000 Table 5.8
+    evaluations: int = 25_000  # 50 particles x 500 iterations, [guzman2015] Table 5.8
     seconds: float = 10.0
     longer: Mapping[str, float] = field(default_factory=dict)
     time_limit: float = 60.0

@@ -21,7 +21,7 @@ from trajopt.optimize.method import Method, require_unconstrained
 
 _LARGE = 1e100  # stands for an infeasible evaluation
 EXAMPLE = {"c1": 0.5, "c2": 0.3, "w": 0.9}  # pyswarms 1.3 documentation, "Basic Optimization"
-CONSTRICTION = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # Clerc and Kennedy 2002, as our default
+CONSTRICTION = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # [clerc2002], as our default
 _FOREVER = 1_000_000  # iterations; the run's budget ends searches before
 
 

@@ -34,7 +34,7 @@ def data_profile(times: ArrayLike, dimension: ArrayLike, budget: ArrayLike) -> A
     """(k, optimizers): share of (problem, seed) pairs solved within ``budget`` (k,) simplex
     gradients.
 
-    Moré and Wild 2009, eq. 2.3: evaluations divided by dimension + 1. ``times`` (p, o, s), NaN
+    [more2009], eq. 2.3: evaluations divided by dimension + 1. ``times`` (p, o, s), NaN
     where a run does not exist.
     """
     scaled = _three(times) / (np.asarray(dimension, dtype=np.float64)[:, None, None] + 1.0)
@@ -45,7 +45,7 @@ def performance_profile(times: ArrayLike, ratio: ArrayLike) -> Array:
     """(k, optimizers): share of problems solved within ``ratio`` (k,) times the best optimizer's
     time.
 
-    Dolan and Moré 2002, on the median over seeds of each problem and optimizer. Problems that
+    [dolan2002], on the median over seeds of each problem and optimizer. Problems that
     nobody solved count as unsolved by all.
     """
     table = _three(times)
@@ -91,7 +91,7 @@ class RunningTime:
 def expected_running_time(
     times: ArrayLike, used: ArrayLike, rng: Generator, draws: int = 1000
 ) -> RunningTime:
-    """ERT of one optimizer on one problem (Hansen et al. 2009, eq. 3) with a percentile bootstrap
+    """ERT of one optimizer on one problem ([hansen2009], eq. 3) with a percentile bootstrap
     over runs.
 
     ``times`` (s,): time to the target, inf for failures. ``used`` (s,): what each run used in all.
@@ -123,7 +123,7 @@ def no_worse(first: ArrayLike, second: ArrayLike) -> float:
 
 
 def holm(p_values: ArrayLike) -> Array:
-    """(k,): p-values corrected for k tests (Holm 1979), to be compared with the level itself."""
+    """(k,): p-values corrected for k tests [holm1979], to be compared with the level itself."""
     p = np.asarray(p_values, dtype=np.float64)
     order = np.argsort(p, kind="stable")
     corrected = np.empty(len(p))

@@ -55,7 +55,7 @@ def export(
     out: Annotated[Path, typer.Option(help="CSV file to write")],
     sample_time: Annotated[float, typer.Option(help="seconds between commands")] = 0.5,
     rule: Annotated[
-        str, typer.Option(help="mean: exact wheel angles; held: as thesis 004 digitises")
+        str, typer.Option(help="mean: exact wheel angles; held: as Waheed 2006 digitises")
     ] = "mean",
     set_: Overrides = None,
 ) -> None:
@@ -76,7 +76,7 @@ def compare(
     log: Annotated[Path, typer.Argument(help="CSV with columns t, x, y, yaw, v")],
     set_: Overrides = None,
 ) -> None:
-    """Compare a plan with the log of what the robot did, in the terms of thesis 004's tables."""
+    """Compare a plan with the log of what the robot did, in the terms of Waheed 2006."""
     from trajopt.control.commands import compare_log
 
     found = compare_log(_timed(plan, set_, "auto"), log)

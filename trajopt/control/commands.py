@@ -1,6 +1,6 @@
 """Wheel speed commands of a differential drive, and what the robot did with them.
 
-Commands are linear wheel speeds (m/s) held over one sample time, as thesis 004 hands them over
+Commands are linear wheel speeds (m/s) held over one sample time, as [waheed2006] hands them over
 (section 3.5).
 """
 
@@ -50,8 +50,8 @@ class StudyRow(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """What a log says of a plan, as Tables 3 to 18 of thesis 004. Norms are root mean squares (eq.
-    3.10)."""
+    """What a log says of a plan, as Tables 3 to 18 of [waheed2006]. Norms are root mean squares
+    (eq. 3.10)."""
 
     speed_error: float  # m/s
     heading_error: float  # rad
@@ -127,7 +127,7 @@ def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array)
 def sample_time_study(
     trajectory: Trajectory, sample_times: Sequence[float], rule: Literal["held", "mean"] = "held"
 ) -> list[StudyRow]:
-    """Tables 1 and 2 of thesis 004 without its disturbances: what digitising alone costs."""
+    """Tables 1 and 2 of [waheed2006] without its disturbances: what digitising alone costs."""
     robot, rows = _robot(trajectory), []
     start, goal = trajectory.at([0.0, trajectory.duration]).pose
     for sample_time in sample_times:

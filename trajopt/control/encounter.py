@@ -225,7 +225,7 @@ def safe_speed(
 
     v delay + v^2 / (2 braking) + w (delay + v / braking) <= range, with ``delay`` (s) from one scan
     to the reaction on the next, ``braking`` (m/s^2) what the slope leaves, w = ``obstacle_speed``
-    towards the robot (m/s). Thesis 004, eq. 2.26, is the first term alone. 0 where even standing
+    towards the robot (m/s). [waheed2006], eq. 2.26, is the first term alone. 0 where even standing
     still is not far enough. Raises ArgumentError for values that are not positive.
     """
     for name, value in (("sensor_range", sensor_range), ("delay", delay), ("braking", braking)):

@@ -1,8 +1,8 @@
-"""Closed-loop tracking of a trajectory by a differential drive (the first future work of thesis
-004).
+"""Closed-loop tracking of a trajectory by a differential drive (the first future work of
+[waheed2006]).
 
-The law is that of Kanayama et al. (1990) in the form whose damping does not depend on speed (de
-Luca et al., 2001): with the error (ex, ey, eyaw) of the reference seen from the robot,
+The law is that of [kanayama1990] in the form whose damping does not depend on speed [deluca2001]:
+with the error (ex, ey, eyaw) of the reference seen from the robot,
 
     v = v_ref cos(eyaw) + k ex,   w = w_ref + c v_ref sinc(eyaw) ey + g eyaw,   g = 2 z sqrt(w_ref^2
     + c v_ref^2)

@@ -18,7 +18,7 @@ _MOVING = (
 
 @dataclass(frozen=True)
 class Acceleration:
-    """Rate of translational speed between -``braking`` and ``forward``, m/s^2 (thesis 004, eqs.
+    """Rate of translational speed between -``braking`` and ``forward``, m/s^2 ([waheed2006], eqs.
     2.7, 2.8).
 
     The speed is v = p s' with p = |(twist_x, twist_y)|, so v' = p s'' + (d . acceleration_rate)

@@ -20,8 +20,8 @@ class Slip:
     curvature.
 
     Robots whose driven wheels all have plain tyres: ||(f_x, f_y)|| <= friction times the load on
-    the driven wheels, as the inscribed polygon of ``sides`` sides (SOURCES 004; 16 sides cost 0.07
-    % of the time). The tyres share the force as their loads allow, and the yaw moment is not
+    the driven wheels, as the inscribed polygon of ``sides`` sides (16 of them cost 0.07 % of the
+    time). The tyres share the force as their loads allow, and the yaw moment is not
     counted. With ``per_wheel`` each tyre gets its own polygon: forces are the least-norm ones with
     the right sum and yaw moment. This is stricter, as two wheels on one axle also have to hold the
     body on its curve.

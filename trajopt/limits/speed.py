@@ -14,7 +14,7 @@ from trajopt.robots.robot import Robot
 
 @dataclass(frozen=True)
 class Speed:
-    """Translational speed of the body origin <= ``largest``, m/s (thesis 004, eq. 2.6).
+    """Translational speed of the body origin <= ``largest``, m/s ([waheed2006], eq. 2.6).
 
     Where the robot turns on the spot only translation counts, so nothing is bounded there.
     Raises ArgumentError unless ``largest`` > 0.

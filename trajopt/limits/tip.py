@@ -22,7 +22,7 @@ class Tip:
     The load on the far side of every edge of the support polygon (the convex hull of the contacts)
     stays >= 0: -h n . (f_x, f_y) <= d f_z, with n the outward normal of the edge and d its distance
     from the foot of the centre of gravity. For two axles these are N_A >= 0, N_B >= 0 and h |f_y|
-    <= w f_z (SOURCES 004). One row an edge; contact with the ground (f_z >= 0) follows from them.
+    <= w f_z. One row an edge; contact with the ground (f_z >= 0) follows from them.
     Raises ArgumentError for a reserve < 0, a centre of gravity outside the support, or no robot.
     """
 

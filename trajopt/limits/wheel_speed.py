@@ -19,8 +19,8 @@ from trajopt.robots.robot import Robot
 
 @dataclass(frozen=True)
 class WheelSpeed:
-    """|wheel rate| <= ``largest``, rad/s, of every wheel (rolling rows of lecture 003); one number,
-    or one a wheel (W,), inf where a wheel has no limit.
+    """|wheel rate| <= ``largest``, rad/s, of every wheel (rolling rows of [wheels-lecture]); one
+    number, or one a wheel (W,), inf where a wheel has no limit.
 
     For two fixed wheels at +-b it is s'^2 <= (r largest / (1 + b |kappa|))^2.
     Raises ArgumentError unless ``largest`` > 0, when there is no robot, or for another number of

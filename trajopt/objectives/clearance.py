@@ -1,7 +1,7 @@
 """Keeping a robot's footprint on free ground along the whole path, as a violation.
 
-The violation is the depth (m) by which it leaves that ground at the worst place; searches see it on a coarse grid with a small reserve, ``score`` recomputes it without
-one on a grid ten times finer.
+The violation is the depth (m) by which it leaves that ground at the worst place; searches see it on
+a coarse grid with a small reserve, ``score`` recomputes it without one on a grid ten times finer.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ class ClearObjective(OnTerminal):
     # ------------------------
 
     def effort(self, candidates: Array) -> Array:
-        """(n,): the inner objective's; candidates that leave the free ground come after all that stay
-        inside."""
+        """(n,): the inner objective's; candidates that leave the free ground come after all that
+        stay inside."""
         effort = self.inner.effort(candidates)
         outside = np.maximum(RESERVE - self.margins(candidates), 0.0)
         return np.where(outside > 0, effort.max(initial=0.0) + 1.0 + outside, effort)

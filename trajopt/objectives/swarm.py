@@ -142,7 +142,7 @@ def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type:
 
 @numba.njit(cache=True, error_model="numpy")
 def terminal_costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type: ignore[no-untyped-def]  # numba infers
-    """Table 4.4 of thesis 000 from final states ``end`` (7, n)."""
+    """Table 4.4 of [guzman2015] from final states ``end`` (7, n)."""
     for i in range(end.shape[1]):
         total = 0.0
         for r in range(3):

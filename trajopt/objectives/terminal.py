@@ -1,4 +1,4 @@
-"""Terminal cost of a spline motion: final pose and final wheel angles (thesis 000, Table 4.4).
+"""Terminal cost of a spline motion: final pose and final wheel angles ([guzman2015], Table 4.4).
 
     S = gains . |pose error| + wheel_gain * sum over critical wheels of |folded wheel deviation|
 

@@ -25,7 +25,7 @@ from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective
 
 FEASIBLE = 1e-9  # violation up to which a candidate counts as feasible (rounding), chosen
-DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, thesis 000 Table 5.8
+DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, [guzman2015] Table 5.8
 _KEPT_SAMPLES = 50_000  # explored candidates kept for pictures
 
 
@@ -407,8 +407,8 @@ class Starts:
 
 
 def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:
-    """Deb's feasibility rule: feasible before infeasible, then the cost, or else the violation,
-    decides."""
+    """Deb's feasibility rule [deb2000]: feasible before infeasible, then the cost, or else the
+    violation, decides."""
     feasible, than_feasible = violation <= FEASIBLE, than_violation <= FEASIBLE
     if feasible and than_feasible:
         return bool(cost < than_cost)

@@ -1,5 +1,5 @@
-"""CMA-ES by the package pycma, behind the package's contract. Constraints by Deb's rule as a
-rank."""
+"""CMA-ES [hansen2016] by the package pycma, behind the package's contract. Constraints by Deb's
+rule as a rank."""
 
 from __future__ import annotations
 

@@ -28,9 +28,9 @@ _STEP = 0.1  # of the width: BOBYQA's first step, chosen
 class NLopt(Method):
     """One of NLopt's derivative-free methods, on variables scaled to [0, 1].
 
-    "direct" divides the bounds into ever smaller rectangles (Gablonsky's locally biased form) and
-    needs no start (x0 is only evaluated first); "bobyqa" fits quadratic models (Powell 2009) from
-    ``starts`` points: x0 or the middle, then random.
+    "direct" divides the bounds into ever smaller rectangles (locally biased form [gablonsky2001])
+    and needs no start (x0 is only evaluated first); "bobyqa" fits quadratic models [powell2009]
+    from ``starts`` points: x0 or the middle, then random.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()

@@ -48,13 +48,14 @@ _CHOICES = {
 
 @dataclass(frozen=True)
 class ParticleSwarm(Method):
-    """PSO; a start (d,) becomes the first particle's position. Defaults are the constriction PSO with a global best; the functions below are presets.
+    """PSO; a start (d,) becomes the first particle's position. Defaults are the constriction PSO
+    with a global best; the functions below are presets.
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position
-    inside 0.9 of the space (thesis 000, Table 5.4) and stops the particle; "reflect" mirrors it
+    inside 0.9 of the space ([guzman2015], Table 5.4) and stops the particle; "reflect" mirrors it
     back and reverses its velocity in that dimension; "mirror" mirrors it back alone (as pyswarms's
     "reflective"); "absorb" puts it on the border and stops it there; "invisible" lets it fly on
-    without evaluating it (Robinson and Rahmat-Samii 2004); "none" evaluates it outside, where it
+    without evaluating it [robinson2004]; "none" evaluates it outside, where it
     counts as infeasible. ``start``: "uniform" draws positions uniformly; "grid" lays the first two
     variables on a grid (Table 5.4); "sobol" takes a Sobol sequence with a random shift.
     ``velocity_limit``: largest velocity as a share of the width of the bounds; None: unlimited.
@@ -68,19 +69,19 @@ class ParticleSwarm(Method):
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
 
-    particles: int = 50  # thesis 000, section 4.2.2
-    inertia: float = 0.7298  # Clerc and Kennedy 2002: constriction factor for phi = 4.1
+    particles: int = 50  # [guzman2015], section 4.2.2
+    inertia: float = 0.7298  # [clerc2002]: constriction factor for phi = 4.1
     cognitive: float = 1.49618  # 0.7298 * 2.05, the same source
     social: float = 1.49618
     topology: Literal["gbest", "ring"] = "gbest"
-    neighbours: int = 1  # on each side of the ring; Bratton and Kennedy 2007
+    neighbours: int = 1  # on each side of the ring; [bratton2007]
     boundary: Boundary = "reflect"  # chosen
     start: Literal["uniform", "grid", "sobol"] = "uniform"
     velocity_limit: float | None = (
-        None  # the constriction factor makes one unnecessary, Clerc and Kennedy 2002
+        None  # the constriction factor makes one unnecessary, [clerc2002]
     )
     final_inertia: float | None = None
-    horizon: int = 500  # iterations, thesis 000 Table 5.8
+    horizon: int = 500  # iterations, [guzman2015] Table 5.8
     stagnation: int | None = None
     restart: bool = False
 
@@ -161,7 +162,7 @@ class ParticleSwarm(Method):
 
 
 def constriction() -> ParticleSwarm:
-    """Constriction PSO with a global best (Clerc and Kennedy 2002): the reference, quick to
+    """Constriction PSO with a global best [clerc2002]: the reference, quick to
     converge."""
     return ParticleSwarm()
 
@@ -170,20 +171,20 @@ def local_best() -> ParticleSwarm:
     """Constriction on a ring of two neighbours, reflected at the bounds: the package's best preset.
 
     Slower to converge than the global best, and so caught in fewer local minima: on the eight
-    problems of thesis 000 through the actuators its median over seeds is the best value known, or
+    problems of [guzman2015] through the actuators its median over seeds is the best value known, or
     near it (docs/pso_vs_gradient.md).
     """
     return ParticleSwarm(topology="ring")
 
 
 def ring() -> ParticleSwarm:
-    """Standard PSO of Bratton and Kennedy 2007: constriction, ring of two neighbours, invisible
+    """Standard PSO of [bratton2007]: constriction, ring of two neighbours, invisible
     outside."""
     return ParticleSwarm(topology="ring", boundary="invisible")
 
 
 def falling_inertia() -> ParticleSwarm:
-    """Shi and Eberhart 1998: inertia from 0.9 to 0.4, c1 = c2 = 2, velocity clamped to the space's
+    """[shi1998]: inertia from 0.9 to 0.4, c1 = c2 = 2, velocity clamped to the space's
     width."""
     return ParticleSwarm(
         inertia=0.9, final_inertia=0.4, cognitive=2.0, social=2.0, velocity_limit=1.0
@@ -191,7 +192,7 @@ def falling_inertia() -> ParticleSwarm:
 
 
 def thesis_first() -> ParticleSwarm:
-    """Thesis 000, Table 5.2: c1 = c2 = 0.45, no inertia weight, particles may leave the space.
+    """[guzman2015], Table 5.2: c1 = c2 = 0.45, no inertia weight, particles may leave the space.
 
     Nothing damps this swarm (with w = 1 the variance of a particle's position grows without bound,
     whatever c1 and c2 are) and nothing brings it back: soon all particles are outside for good, and
@@ -202,7 +203,7 @@ def thesis_first() -> ParticleSwarm:
 
 
 def thesis_enhanced() -> ParticleSwarm:
-    """Thesis 000, Table 5.8: c1 = c2 = 0.15, no inertia weight, particles that leave are reset.
+    """[guzman2015], Table 5.8: c1 = c2 = 0.15, no inertia weight, particles that leave are reset.
 
     As undamped as the first one; the resets keep it inside, where it samples rather than converges.
     """

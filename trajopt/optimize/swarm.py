@@ -324,7 +324,7 @@ def _bring_back(
     rng: Generator,
 ) -> None:
     """Apply a boundary rule to the coordinates outside, x[rows, columns], in place."""
-    if boundary == "reset":  # thesis 000, Table 5.4: anew, inside 0.9 of the space
+    if boundary == "reset":  # [guzman2015], Table 5.4: anew, inside 0.9 of the space
         lost, width = np.unique(rows), high - low
         x[lost] = low + width / 2 + 0.9 * (rng.random((len(lost), x.shape[1])) - 0.5) * width
         v[lost] = 0.0

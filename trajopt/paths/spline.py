@@ -2,8 +2,8 @@
 
 On fixed knots the value and every derivative of a cubic spline are linear in the control values, so
 one matrix a derivative, computed once, serves every candidate of a search: value = matrix @
-control_values. Ends are natural (zero second derivative; thesis 000, Eqn. 4.18) or clamped (given
-first derivative; thesis 004, Appendix 1). Plain NumPy on the matrices; the same matrices multiply
+control_values. Ends are natural (zero second derivative; [guzman2015], Eqn. 4.18) or clamped (given
+first derivative; [waheed2006], Appendix 1). Plain NumPy on the matrices; the same matrices multiply
 CasADi expressions.
 """
 
@@ -119,7 +119,7 @@ class SplineBasis:
 
 @lru_cache(maxsize=32)
 def uniform_basis(points: int) -> SplineBasis:
-    """Natural spline on knots 1, 2, ..., ``points``: thesis 000's parametrisation for four
+    """Natural spline on knots 1, 2, ..., ``points``: [guzman2015]'s parametrisation for four
     points."""
     return SplineBasis(tuple(float(i) for i in range(1, points + 1)))
 

@@ -82,7 +82,7 @@ class Spline(Section):
 
 
 class ObjectiveSection(Section):
-    """Terminal cost of thesis 000, Table 4.4, or the duration that time scaling needs."""
+    """Terminal cost of [guzman2015], Table 4.4, or the duration that time scaling needs."""
 
     kind: Literal["terminal", "duration"] = "terminal"
     pose_gains: tuple[NonNegative, NonNegative, NonNegative] = Field(

@@ -5,8 +5,8 @@ Path parameter s, speed v and acceleration a are states at N + 1 times, jerk is 
 them, the duration is free. The limits' rows hold at every node; rows that no motion of this kind
 comes near are left out of the program, and every row is checked afterwards. Where rows are broken
 between nodes the intervals are split, rows left out are put in, and the program is solved again
-from where it was. Jerk rows on an s-grid are not convex and fail near rest (SOURCES 004), so time
-is the grid here.
+from where it was. Jerk rows on an s-grid are not convex and fail near rest, so time is the grid
+here.
 """
 
 from __future__ import annotations

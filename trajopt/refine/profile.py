@@ -1,4 +1,4 @@
-"""Following a given speed profile as closely as the limits allow (thesis 004, section 2.4).
+"""Following a given speed profile as closely as the limits allow ([waheed2006], section 2.4).
 
 From below, the profile is one more bound and the fastest motion under it is the closest at every
 place: no feasible profile that stays below is faster anywhere. In the least-squares sense the

@@ -6,7 +6,7 @@ from trajopt.errors import ArgumentError
 
 
 def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Wilson's 95 % score interval of a binomial share (Wilson 1927); (0, 1) without trials.
+    """Wilson's 95 % score interval of a binomial share [wilson1927]; (0, 1) without trials.
 
     Raises ArgumentError unless 0 <= successes <= trials.
     """

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath, ...]:
-    """Draw path.png, where there is a path, convergence.png, where control points were searched, and
-    profile.png, where there is a trajectory. Returns the files.
+    """Draw path.png, where there is a path, convergence.png, where control points were searched,
+    and profile.png, where there is a trajectory. Returns the files.
 
     Raises ArgumentError where the folder cannot be written.
     """

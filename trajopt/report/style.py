@@ -1,6 +1,6 @@
 """One look for all pictures: colours that colour-blind readers can tell apart, thin axes, SI units.
 
-The colours are those of Okabe and Ito, "Color Universal Design" (2008).
+The colours are those of [okabe2008].
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Wheel actuator with saturation and dead-zone (thesis 000, section 4.2.2), integrated exactly.
+"""Wheel actuator with saturation and dead-zone ([guzman2015], section 4.2.2), integrated exactly.
 
 The actuator passes a commanded wheel speed w unchanged, but gives 0 below the dead-zone and
 +-saturation beyond the saturation:

@@ -42,7 +42,8 @@ def differential(
     >>> from trajopt.robots import Robot
     >>> robot = Robot.differential(
     ...     name="mine", mass=12.0, cog=(-0.05, 0.0, 0.1), chassis=(0.4, 0.3, 0.1), clearance=0.05,
-    ...     chassis_place=(-0.1, 0.0), track=0.34, radius=0.1, width=0.04, wheel_mass=0.8, torque=4.0,
+    ...     chassis_place=(-0.1, 0.0), track=0.34, radius=0.1, width=0.04, wheel_mass=0.8,
+    torque=4.0,
     ...     castor=(-0.22, 0.0), castor_radius=0.04, castor_trail=0.03, castor_mass=0.2)
     >>> robot.inverse.round(2).tolist()
     [[10.0, 0.0, -1.7], [10.0, 0.0, 1.7]]

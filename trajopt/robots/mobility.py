@@ -27,8 +27,7 @@ _SLIDE = (WheelKind.FIXED, WheelKind.STEERED)  # whose sliding rows forbid motio
 
 @dataclass(frozen=True)
 class Mobility:
-    """Degrees of mobility, steerability and manoeuvrability (003; Campion, Bastin,
-    d'Andrea-Novel)."""
+    """Degrees of mobility, steerability and manoeuvrability [wheels-lecture, campion1996]."""
 
     mobility: int
     steerability: int
@@ -60,8 +59,8 @@ def pfaffian_rows(robot: Robot, steering: Sequence[Any] | None = None) -> list[l
 def pfaffian(robot: Robot, steering: ArrayLike | None = None, *, yaw: float | None = None) -> Array:
     """(R, 3 + 2 W): the Pfaffian matrix A of ``pfaffian_rows`` as numbers.
 
-    With ``yaw`` (rad) the twist is (x', y', yaw') in the world frame, as in lecture 003; R^T(yaw)
-    stands where the lecture's eqs. 5-10 print R.
+    With ``yaw`` (rad) the twist is (x', y', yaw') in the world frame, as in [wheels-lecture];
+    R^T(yaw) stands where the lecture's eqs. 5-10 print R.
     """
     matrix = np.array(pfaffian_rows(robot, _checked(robot, steering).tolist()), dtype=np.float64)
     if yaw is not None:

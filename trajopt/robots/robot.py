@@ -23,7 +23,7 @@ from trajopt.robots.description import RobotDescription, WheelSection
 from trajopt.robots.wheel import Row, Wheel, WheelKind
 from trajopt.schema import read_tables, set_key, validated
 
-STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
+STANDARD_GRAVITY = 9.80665  # m/s^2, [iso80000-3]
 DATA = Path(__file__).parent / "data"  # the shipped robots
 _AROUND = 48  # directions of a wheel that turns, for the outline; a multiple of 4
 _RANK = 1e-9  # singular values below this share of the largest count as zero

@@ -1,4 +1,4 @@
-"""Rolling and sliding constraints of the five kinds of wheel (lecture 003).
+"""Rolling and sliding constraints of the five kinds of wheel [wheels-lecture].
 
 A wheel is described by the lecture's polar data: its centre (for a castor, its pivot) sits at
 distance ``l`` and angle ``alpha`` in the body frame; ``beta`` turns the wheel plane so that the
@@ -30,7 +30,7 @@ from trajopt.errors import ArgumentError
 
 
 class WheelKind(Enum):
-    """The five kinds of wheel of lecture 003."""
+    """The five kinds of wheel of [wheels-lecture]."""
 
     FIXED = "fixed"
     STEERED = "steered"

@@ -28,11 +28,11 @@ ENGINES = ("pybullet", "mujoco")
 class SimRobot:
     """A chassis box on four roller wheels, all that an engine needs to build it.
 
-    ``robot`` is what it was made from, ``chassis_mass`` [kg] without wheels, ``chassis_size`` (length, width, height) [m] of the box
-    that collides with the terrain, ``chassis_clearance`` [m] from the ground to its bottom,
-    ``cog_height`` [m] of the chassis alone above the ground, ``wheel_positions`` four (x, y) [m],
-    ``wheels`` in the same order, ``torque_limit`` [N m] at each wheel, ``chassis_inertia``
-    principal (xx, yy, zz) [kg m^2], by default that of the box.
+    ``robot`` is what it was made from, ``chassis_mass`` [kg] without wheels, ``chassis_size``
+    (length, width, height) [m] of the box that collides with the terrain, ``chassis_clearance`` [m]
+    from the ground to its bottom, ``cog_height`` [m] of the chassis alone above the ground,
+    ``wheel_positions`` four (x, y) [m], ``wheels`` in the same order, ``torque_limit`` [N m] at
+    each wheel, ``chassis_inertia`` principal (xx, yy, zz) [kg m^2], by default that of the box.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The simulator's own test: drive straight and compare with kinematics (SMDW thesis, section
+"""The simulator's own test: drive straight and compare with kinematics ([guzman2015], section
 5.3)."""
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from trajopt.errors import ArgumentError
 from trajopt.simulate.engine import Command, Recording, SimRobot
 from trajopt.simulate.scene import require
 
-# Body directions of the three tests [rad] (SMDW thesis, Figure 5.6; left in right-handed axes).
+# Body directions of the three tests [rad] ([guzman2015], Figure 5.6; left in right-handed axes).
 DIRECTIONS: tuple[tuple[str, float], ...] = (
     ("forward", 0.0),
     ("lateral", math.pi / 2.0),

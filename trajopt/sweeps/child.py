@@ -1,7 +1,7 @@
 """The process that runs cases: loads a run function, runs what its host sends, and sends rows back.
 
-It may die at any time, by a case's fault; its host (``supervisor.py``) then knows which case it was from
-a few bytes of memory they share. Standard output and error are the host's to read.
+It may die at any time, by a case's fault; its host (``supervisor.py``) then knows which case it was
+from a few bytes of memory they share. Standard output and error are the host's to read.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Linear time scaling: one factor for the whole given-time motion (thesis 004, eqs. 2.34 to
+"""Linear time scaling: one factor for the whole given-time motion ([waheed2006], eqs. 2.34 to
 2.38)."""
 
 from __future__ import annotations

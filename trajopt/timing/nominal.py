@@ -1,4 +1,4 @@
-"""A path executed at uniform spline speed in a given time, limits or not: what thesis 000
+"""A path executed at uniform spline speed in a given time, limits or not: what [guzman2015]
 commands."""
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ REFINE_ABOVE = (
 )
 REFINE_ROUNDS = 4  # rounds spent on that; chosen
 MOST_ROUNDS = 16  # rounds before giving up on a violation above the largest slow-down; chosen
-LARGEST_SLOWDOWN = 1.001  # of time; DESIGN: at most 0.1 %
+LARGEST_SLOWDOWN = 1.001  # of time; chosen
 _KEPT = 1e-9  # relative violation that counts as none
 _TIGHTER = (
     0.0,
@@ -74,7 +74,7 @@ def time_scale(
 
     ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast
     pass, where only s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are
-    slower motions: "linear" (thesis 004: one factor for the whole motion, uniform in the spline
+    slower motions: "linear" ([waheed2006]: one factor for the whole motion, uniform in the spline
     parameter, with the end speeds that the path gives it, so start and end speed must stay 0) and
     "segments" (below the speed of a factor for each spline segment). ``gridpoints``: how many, or
     path parameters (m); more are added where limits are broken between them. ``stops``: path
@@ -271,7 +271,7 @@ def _trajectory(job: _Job, fine: FineRows, sd2: Array, factor: float, engine: st
 
 
 def _linear(job: _Job, fine: FineRows) -> Trajectory:
-    """One factor on the time of the whole motion (thesis 004, eqs. 2.34 to 2.39)."""
+    """One factor on the time of the whole motion ([waheed2006], eqs. 2.34 to 2.39)."""
     if fine.edges:
         fine = refined(
             job.path, fine, insert(job.path, fine.u, np.asarray(fine.edges)), job.limits, job.robot

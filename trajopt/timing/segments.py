@@ -1,4 +1,4 @@
-"""A factor of its own for every spline segment, to follow a given profile (thesis 004, eqs. 2.40
+"""A factor of its own for every spline segment, to follow a given profile ([waheed2006], eqs. 2.40
 and 2.41).
 
 The thesis scales the time of each segment so that the motion touches the limits (or the given speed

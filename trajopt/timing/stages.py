@@ -21,7 +21,7 @@ from trajopt.paths.samples import PathSamples, sample_at
 from trajopt.robots.robot import Robot
 
 SD2_CAP = 1e8  # m^2/s^2; stands for "no bound": 10 km/s, far beyond any ground robot
-FINER = 10  # intervals of the fine grid in one of the solver's (DESIGN)
+FINER = 10  # intervals of the fine grid in one of the solver's; chosen
 _CHUNK = 1000  # intervals worked on at once, to bound memory
 
 

@@ -1,4 +1,5 @@
-"""Time-optimal profile by the package ``toppra`` (reachability analysis, seidel solver)."""
+"""Time-optimal profile by the package ``toppra`` (reachability analysis [pham2018], seidel
+solver)."""
 
 from __future__ import annotations
 

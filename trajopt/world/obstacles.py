@@ -16,7 +16,8 @@ _ROUND = 48  # corners of a circle's outline; chosen: 0.2 % of the radius outsid
 
 
 class Obstacle(Protocol):
-    """Something on the ground: ``outline`` (K corners, counter-clockwise, m) up to ``height``, m."""
+    """Something on the ground: ``outline`` (K corners, counter-clockwise, m) up to ``height``,
+    m."""
 
     @property
     def name(self) -> str: ...

@@ -9,7 +9,9 @@ from trajopt.arrays import require_not_negative
 from trajopt.errors import ArgumentError
 from trajopt.world.height_map import LARGEST_GRID, HeightMap
 
-MESH = 0.15  # m between mesh points; chosen so that sigma 4.5 cm gives about 45 deg (thesis 001, section 4.3)
+# m between mesh points; chosen so that sigma 4.5 cm gives about 45 deg ([udengaard2008], section
+# 4.3)
+MESH = 0.15
 
 
 def rough_ground(

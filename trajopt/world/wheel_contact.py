@@ -1,4 +1,4 @@
-"""Where a thin wheel touches a triangulated surface (thesis 001, section 4.3)."""
+"""Where a thin wheel touches a triangulated surface ([udengaard2008], section 4.3)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The design objective of thesis 001: Bekker, Table V, the factorial, every optimizer, the Pareto
-front."""
+"""The design objective of [udengaard2008]: Bekker, Table V, the factorial, every optimizer, the
+Pareto front."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ CONSTRAINED = {
     "cma-es",
     "hybrid",
 }
-# Swarms without damping (thesis 000) end 1-3 % short whatever one swarm may use: they get more, in
+# Swarms without damping [guzman2015] end 1-3 % short whatever one swarm may use: they get more, in
 # restarts.
 UNDAMPED = {"pso-thesis-first": thesis_first(), "pso-thesis-enhanced": thesis_enhanced()}
 EVALUATIONS = 6_000

@@ -1,4 +1,4 @@
-"""Geometric constraints of thesis 001, sections 3.1, 3.4 and 3.5."""
+"""Geometric constraints of [udengaard2008], sections 3.1, 3.4 and 3.5."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Isotropy against singular values, closed forms and thesis 001's Tables I, II, eq. 4 and Figures
-9, 11."""
+"""Isotropy against singular values, closed forms and [udengaard2008]'s Tables I, II, eq. 4 and
+Figures 9, 11."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from trajopt.systems.asoc.isotropy import (
 )
 from trajopt.systems.asoc.modules import AsocGeometry, asoc_robot, wheel_steering
 
-# Thesis 001, Table I by converged quadrature (an independent computation): N, lost, partial ->
+# [udengaard2008], Table I by converged quadrature (an independent computation): N, lost, partial ->
 # value.
 TABLE_1 = [
     (2, (), (0,), 0.450),

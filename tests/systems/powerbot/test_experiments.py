@@ -1,4 +1,4 @@
-"""Problems, limits and times of thesis 004 against its tables (tests/data/powerbot)."""
+"""Problems, limits and times of [waheed2006] against its tables (tests/data/powerbot)."""
 
 from __future__ import annotations
 

@@ -233,5 +233,5 @@ def test_experiment_6_along_its_profile(manner: Literal["below", "least_squares"
     )
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0
-    assert seen.speed_error < 0.043  # m/s, what thesis 004 measured on the robot (Table 18)
+    assert seen.speed_error < 0.043  # m/s, what [waheed2006] measured on the robot (Table 18)
     assert seen.slip_ratio < 0.02

@@ -1,4 +1,5 @@
-"""Design of a robot on split offset casters as an objective (thesis 001, sections 3.2 and 3.3).
+"""Design of a robot on split offset casters as an objective ([udengaard2008], sections 3.2 and
+3.3).
 
 Decision variables, m: offset, split, gap, width, with gap = wheel radius - offset. The gap replaces
 the radius so that the condition "offset below the radius" is a bound: eq. 8's root never sees a
@@ -32,7 +33,7 @@ from trajopt.systems.asoc.isotropy_curve import IsotropyCurve, isotropy_curve
 from trajopt.systems.asoc.modules import BODY_LENGTH, TOTAL_MASS, envelope
 from trajopt.systems.asoc.soil import Soil
 
-FIXED_SHARE = 0.15  # of the total mass, structure and electronics (thesis 001, section 3.2)
+FIXED_SHARE = 0.15  # of the total mass, structure and electronics ([udengaard2008], section 3.2)
 MODULE_SHARE = 0.05  # of the total mass, one module without wheels (section 3.2)
 RUBBER = 920.0  # kg/m^3, wheels (section 3.2)
 BATTERY_ENERGY = 576e3  # J/kg, lithium-ion (section 3.2)

@@ -2,7 +2,7 @@
 slopes.
 
 One implicit step in time. The unknowns are the body's twist and the turning rates of the modules;
-mass, wheel motors (the PD loop of thesis 001, section 4.3) and ground are in balance:
+mass, wheel motors (the PD loop of [udengaard2008], section 4.3) and ground are in balance:
 
 - a motor pushes with K_p e + K_d e', so a loaded wheel runs behind its command by force over
 stiffness;
@@ -27,7 +27,7 @@ from trajopt.arrays import Array
 from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.systems.asoc.modules import TOTAL_MASS, AsocGeometry
 
-PROPORTIONAL = 7.3  # N m s/rad, K_p of thesis 001, section 4.3 (unit inferred)
+PROPORTIONAL = 7.3  # N m s/rad, K_p of [udengaard2008], section 4.3 (unit inferred)
 DERIVATIVE = 0.02  # N m s^2/rad, K_d of section 4.3 (unit inferred)
 SLIP_STIFFNESS = 12.0  # force over load per share of travel lost, chosen: 5 % at friction 0.6
 SIDE_STIFFNESS = (

@@ -1,4 +1,4 @@
-"""Kinematic isotropy of robots on split offset casters (thesis 001, sections 2.1-2.5).
+"""Kinematic isotropy of robots on split offset casters ([udengaard2008], sections 2.1-2.5).
 
 Isotropy is the smallest over the largest *singular value* of a Jacobian, yaw weighed by an explicit
 length. "inverse" is the matrix from body twist to wheel speeds, W(alpha) = [F(alpha_i)^-1 [I,
@@ -106,7 +106,7 @@ def ratio_from_gram(gram: Array) -> Array:
     """(n,): smallest over largest singular value of W from W^T W given as (6, n): xx, yy, zz, xy,
     xz, yz.
 
-    Eigenvalues of symmetric 3 x 3 matrices by the trigonometric formula (Smith 1961).
+    Eigenvalues of symmetric 3 x 3 matrices by the trigonometric formula [smith1961].
     """
     xx, yy, zz, xy, xz, yz = gram
     mean = (xx + yy + zz) / 3

@@ -1,4 +1,4 @@
-"""Active split offset casters (thesis 001): module kinematics, frames, geometric constraints.
+"""Active split offset casters [udengaard2008]: module kinematics, frames, geometric constraints.
 
 A module turns by alpha about a vertical axis at the edge of the body; its axle trails the axis by
 ``offset`` and carries two driven wheels ``split`` apart, which may tilt by beta about the fore-aft
@@ -18,7 +18,7 @@ from trajopt.arrays import Array, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.robots.robot import Robot, robot
 
-_SHIPPED = robot("asoc-4").description  # whose sizes are thesis 001's, section 4.3
+_SHIPPED = robot("asoc-4").description  # whose sizes are [udengaard2008]'s, section 4.3
 _WHEEL = _SHIPPED.wheels[0]
 TOTAL_MASS = _SHIPPED.body.mass  # kg
 BODY_LENGTH = 2 * _WHEEL.position[0]  # m
@@ -30,8 +30,8 @@ LEAST_ROOT = (
 
 @dataclass(frozen=True)
 class AsocGeometry:
-    """Sizes of a robot on N modules, equally spaced on a circle, m. Defaults: thesis 001, section
-    4.3.
+    """Sizes of a robot on N modules, equally spaced on a circle, m. Defaults: [udengaard2008],
+    section 4.3.
 
     ``module_radius``: distance of the module axes from the centre; half the body length (inferred).
     """

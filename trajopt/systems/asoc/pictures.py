@@ -1,5 +1,5 @@
-"""Figures of thesis 001 from our numbers: isotropy (8, 9, 11, 13) and tracking (29-31), and the
-Pareto front."""
+"""Figures of [udengaard2008] from our numbers: isotropy (8, 9, 11, 13) and tracking (29-31), and
+the Pareto front."""
 
 from __future__ import annotations
 

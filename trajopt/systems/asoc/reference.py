@@ -19,7 +19,7 @@ from trajopt.timing.scaling import time_scale
 from trajopt.world.height_map import HeightMap
 from trajopt.world.wheel_contact import wheel_contact
 
-SIDE = 4.5  # m, square of thesis 001, section 4.3
+SIDE = 4.5  # m, square of [udengaard2008], section 4.3
 SPEED = 1.5  # m/s, section 4.3
 PLANNED_ACCELERATION = 1.5  # m/s^2, a quarter of what friction 0.6 allows, chosen
 _SAMPLES = 0.01  # s between samples of a planned motion, chosen

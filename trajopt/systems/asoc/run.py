@@ -1,4 +1,4 @@
-"""The robot on split offset casters in a physics engine: what both engines share (thesis 001,
+"""The robot on split offset casters in a physics engine: what both engines share ([udengaard2008],
 section 4.3).
 
 Robot: a body plate, N modules on vertical springs, each free to turn (alpha), its axle pivoted
@@ -32,7 +32,7 @@ from trajopt.systems.asoc.tracking import (
 )
 from trajopt.world.height_map import HeightMap
 
-FRICTION = 0.6  # thesis 001, section 4.3
+FRICTION = 0.6  # [udengaard2008], section 4.3
 STEP = 0.002  # s, of the engines; measured on other robots of this package: 10 ms drifts
 CONTROL_STRIDE = 5  # steps between two commands: 10 ms, chosen
 SETTLE = 0.5  # s on the springs before the motion starts, chosen

@@ -1,5 +1,5 @@
-"""Deformable soils and the resistance of wheels that compact them (Bekker; thesis 001, section
-3.2)."""
+"""Deformable soils and the resistance of wheels that compact them ([bekker1969]; [udengaard2008],
+section 3.2)."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Soil:
 
 
 KILO = 1000.0
-# Thesis 001, Table III (kPa/m^(n-1), kPa/m^n there)
+# [udengaard2008], Table III (kPa/m^(n-1), kPa/m^n there)
 SOILS: Mapping[str, Soil] = MappingProxyType(
     {
         s.name: s

@@ -1,5 +1,5 @@
-"""Suspension travel of an ASOC module on a four-bar linkage (thesis 001, sections 3.1.3 and 3.4),
-and the point design of section 3.5.
+"""Suspension travel of an ASOC module on a four-bar linkage ([udengaard2008], sections 3.1.3 and
+3.4), and the point design of section 3.5.
 
 Side view of a parallelogram: two parallel bars of one length between body and module, pivots one
 ``spacing`` above the other, so the module axis stays vertical. Bar angle theta > 0 lifts the
@@ -23,7 +23,7 @@ from trajopt.errors import ArgumentError
 from trajopt.systems.asoc.modules import AsocGeometry, workspace_radius
 
 STEP_SHARE = 2.0 / 3.0  # share of the wheel diameter that should rise above a step (section 3.1.3)
-POINT_TRAVEL = 0.33  # m, thesis 001 section 3.5
+POINT_TRAVEL = 0.33  # m, [udengaard2008] section 3.5
 POINT_DESIGN = AsocGeometry(
     modules=4, split=0.21, offset=0.10, wheel_radius=0.163, wheel_width=0.03
 )

@@ -1,5 +1,5 @@
-"""Path tracking of a robot on split offset casters over rough ground (thesis 001, sections 4.2 and
-4.3).
+"""Path tracking of a robot on split offset casters over rough ground ([udengaard2008], sections 4.2
+and 4.3).
 
 Wheels stand on the triangulated ground; module tilt beta and wheel inclination gamma follow from
 the contacts (eq. 20). The body is taken to stay level on its suspension (chosen). What the wheels
@@ -30,7 +30,7 @@ from trajopt.systems.asoc.reference import Reference
 from trajopt.world.height_map import HeightMap
 from trajopt.world.wheel_contact import wheel_contact
 
-FRICTION = 0.6  # thesis 001, section 4.3
+FRICTION = 0.6  # [udengaard2008], section 4.3
 UPDATE_PERIOD = 2.0  # s, position updates at 0.5 Hz (section 4.3)
 POSITION_GAIN = 2.0  # 1/s, feedback of the pose error onto the commanded body velocity, chosen
 PRELOAD = 3.0  # downward acceleration of a wheel that lost the ground over g: spring over wheel mass, chosen

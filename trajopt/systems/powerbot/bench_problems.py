@@ -1,7 +1,7 @@
 """Routes of PowerBot as problems of the optimizer benchmark.
 
 Names: ``corridor/<seed>/length`` or ``/duration`` (a random corridor with static obstacles),
-``powerbot/<file>`` (a path of thesis 004).
+``powerbot/<file>`` (a path of [waheed2006]).
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ OBSTACLES = 4  # chosen
 OBSTACLE_RADII = (0.3, 0.7)  # m, chosen
 OBSTACLE_SIDE = 0.9  # m off the middle at most, chosen: one side of each stays wide enough
 MOVED_CELLS = 120  # intervals in a search: these paths start slowly in their parameter. Chosen: 0.1 % of the time
-TILE = 0.5  # m by which a knot of thesis 004's paths may be moved, chosen
+TILE = 0.5  # m by which a knot of [waheed2006]'s paths may be moved, chosen
 
 
 def random_corridor(seed: int, kind: Literal["length", "duration"]) -> RouteObjective:
@@ -82,7 +82,7 @@ def random_corridor(seed: int, kind: Literal["length", "duration"]) -> RouteObje
 
 
 def moved_knots(file: FilePath) -> RouteObjective:
-    """Least duration of a path of thesis 004 under its own limits, inner knots free within a tile
+    """Least duration of a path of [waheed2006] under its own limits, inner knots free within a tile
     of 0.5 m.
 
     The limits are the physical ones and leave out the safety speed, which alone would set the
@@ -132,5 +132,5 @@ FAMILIES = {
             "corridor, least time under slip": r"corridor/\d+/duration",
         },
     ),
-    "powerbot": Family(path_of_file, {"thesis 004 path, least time": r"powerbot/.*"}),
+    "powerbot": Family(path_of_file, {"PowerBot path, least time": r"powerbot/.*"}),
 }

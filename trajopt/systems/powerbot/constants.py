@@ -1,4 +1,5 @@
-"""What thesis 004 prints of PowerBot beyond its sizes, which stand in robots/data/powerbot.toml."""
+"""What [waheed2006] prints of PowerBot beyond its sizes, which stand in
+robots/data/powerbot.toml."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class DriveRecord:
 
     @property
     def speed_error(self) -> float:
-        """Root mean square, m/s (eq. 3.10 of thesis 004)."""
+        """Root mean square, m/s (eq. 3.10 of [waheed2006])."""
         return float(np.sqrt(np.mean((self.speed - self.planned_speed) ** 2)))
 
 

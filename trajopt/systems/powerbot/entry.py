@@ -1,4 +1,4 @@
-"""What only thesis 004's problems have: [printed], [[encounters]], limits.variant = "thesis".
+"""What only [waheed2006]'s problems have: [printed], [[encounters]], limits.variant = "thesis".
 
 Encounters are driven by the replanner along the solved path: the motion slows down, stops and
 resumes as the obstacles appear and go, seen by the robot's sonar.

@@ -1,4 +1,4 @@
-"""Identification of a robot's friction and centre of gravity (thesis 004, appendices 2 and 3).
+"""Identification of a robot's friction and centre of gravity ([waheed2006], appendices 2 and 3).
 
 Each function returns the estimate with its standard uncertainty, propagated to first order from
 those of the readings.

@@ -1,6 +1,6 @@
-"""Limits as thesis 004 writes them, so that its tables can be reproduced and its errors shown.
+"""Limits as [waheed2006] writes them, so that its tables can be reproduced and its errors shown.
 
-Wrong in them, and kept (SOURCES 004): braking slip is taken as minus the accelerating one (eq.
+Wrong in them, and kept: braking slip is taken as minus the accelerating one (eq.
 2.21), though braking loads the front drive axle: too strict on the flat, unsafe downhill; the
 tipping bound of eq. 2.24 is a braking bound, but is used in both directions; the sliding speed
 counts the whole weight and the sharpest bend of the whole path (eq. 2.15).

@@ -1,7 +1,7 @@
 """PowerBot as a physics engine builds it: two driven wheels and two free castors.
 
 Wheels touch the floor with one point each (spheres as collision shapes), as the limits assume.
-Castors are balls without friction: they carry load and nothing else, which is what thesis 004
+Castors are balls without friction: they carry load and nothing else, which is what [waheed2006]
 assumes of free-rolling castors; their swivel is left out.
 """
 

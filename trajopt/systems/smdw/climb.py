@@ -1,4 +1,4 @@
-"""Climb trials: drive a robot against a step and see which wheels get up (SMDW thesis, chapter 6).
+"""Climb trials: drive a robot against a step and see which wheels get up ([guzman2015], chapter 6).
 
 Sub-test 1 executes an approach open loop (or with a controller); sub-test 2 starts at the state
 that was reached and drives 2 s at 8.5 rad/s against the step. A wheel is up when its centre has
@@ -26,13 +26,13 @@ from trajopt.systems.smdw.loc8_model import roller_robot
 
 Four = tuple[float, float, float, float]
 
-CLIMB_TIME = 2.0  # s, SMDW thesis section 6.1
-CLIMB_SPEED = 8.5  # rad/s at the wheels, SMDW thesis Table 6.5 (3 km/h)
+CLIMB_TIME = 2.0  # s, [guzman2015] section 6.1
+CLIMB_SPEED = 8.5  # rad/s at the wheels, [guzman2015] Table 6.5 (3 km/h)
 UP = 0.7  # share of the step's height by which a wheel centre must have risen; chosen
 RAMP = 0.1  # s to full speed, chosen: the thesis switches at once
 HOLD = 0.2  # s at the end over which a wheel must have stayed up, chosen
 COAST = 0.3  # s of rest after an approach, chosen
-TIMEOUT = 1.5  # of the planned duration, SMDW thesis section 6.1
+TIMEOUT = 1.5  # of the planned duration, [guzman2015] section 6.1
 
 
 @lru_cache(maxsize=8)

@@ -2,7 +2,7 @@
 step.
 
 ``alpha`` is the angle from the step's normal to the direction of motion (robot forward, or sideways
-in lateral motion), counter-clockwise. It is the alpha of the SMDW thesis's Tables 6.1 and 6.6 (psi
+in lateral motion), counter-clockwise. It is the alpha of [guzman2015]'s Tables 6.1 and 6.6 (psi
 = alpha in forward motion, psi = -90 deg + alpha in lateral motion to the left).
 
 Lateral climbing: the lifted hub goes over the step, then turns like a cam with a flat follower and

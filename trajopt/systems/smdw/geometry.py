@@ -1,7 +1,7 @@
 """Outline of the semi-circular Mecanum double wheel (SMDW) at a step, in closed form and as a point
 cloud.
 
-SMDW thesis, section 4.1: each hub's outline is a half circle (Rc) joined to a half ellipse (Rc,
+[guzman2015], section 4.1: each hub's outline is a half circle (Rc) joined to a half ellipse (Rc,
 Re); the two hubs sit side by side on one axle, half a turn apart, so that one half circle always
 carries.
 

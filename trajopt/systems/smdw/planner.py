@@ -1,7 +1,7 @@
 """From an obstacle to ranked plans: configurations, target poses and wheel angles, exact paths,
 timing.
 
-For every configuration that can climb the step (thesis 000, section 4.1.6) the planner takes the
+For every configuration that can climb the step ([guzman2015], section 4.1.6) the planner takes the
 pose in which the leading wheel will meet the step at the wanted place, and the wheel angles that,
 after rolling over the remaining gap, are in the middle of the window of angles that climb. Among
 the control points that end exactly there, it takes those whose footprint stays on free ground and
@@ -50,8 +50,8 @@ from trajopt.world.obstacles import Step
 THESIS_ALPHAS = (
     math.radians(35.0),
     math.radians(45.0),
-)  # rad, thesis 000 section 4.1.6, either sign
-LARGEST_TURN = math.pi / 2  # rad, thesis 000 section 4.1.6: "does not exceed a quarter turn"
+)  # rad, [guzman2015] section 4.1.6, either sign
+LARGEST_TURN = math.pi / 2  # rad, [guzman2015] section 4.1.6: "does not exceed a quarter turn"
 TIMED_CANDIDATES = 2  # paths that are time-scaled for each configuration, chosen
 RANKING_GRID = (
     40  # gridpoints of the time scaling that ranks candidates, chosen; plans get the default grid

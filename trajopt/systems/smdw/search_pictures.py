@@ -1,7 +1,7 @@
 """Pictures of searches for control points: paths, swarms, costs over iterations and over the place
 of P2.
 
-All take plain arrays, so that any search can be drawn (SMDW thesis, Figures 5.15-5.25, 6.5 and
+All take plain arrays, so that any search can be drawn ([guzman2015], Figures 5.15-5.25, 6.5 and
 6.12).
 """
 

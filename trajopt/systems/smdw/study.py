@@ -1,4 +1,4 @@
-"""One climb trial as a case of a sweep: sub-test 2 of SMDW thesis 000, from a state with chosen and
+"""One climb trial as a case of a sweep: sub-test 2 of [guzman2015], from a state with chosen and
 random errors.
 
 The physics starts where an approach ends, a few centimetres before the step, with the wheel angles

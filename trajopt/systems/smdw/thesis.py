@@ -1,5 +1,5 @@
-"""How thesis 000 searches: through drives, in nominal durations. Its problem files leave both out,
-as motions are time-scaled where drives follow."""
+"""How [guzman2015] searches: through drives, in nominal durations. Its problem files leave both
+out, as motions are time-scaled where drives follow."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Pictures of the SMDW's trials: climb rates, the phase map, closed-loop endings, motions.
 
-All take plain rows and arrays, so that any run of the trials can be drawn (SMDW thesis, Figures
+All take plain rows and arrays, so that any run of the trials can be drawn ([guzman2015], Figures
 6.4-6.13).
 """
 

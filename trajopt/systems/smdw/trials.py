@@ -1,7 +1,7 @@
 """Seeded trials of a planned climb in physics: drive the approach (sub-test 1), then climb
 (sub-test 2).
 
-Thesis 000, sections 6.1 and 6.2, with random friction, start pose and wheel angles. Every trial
+[guzman2015], sections 6.1 and 6.2, with random friction, start pose and wheel angles. Every trial
 draws from its own number, so that it can be repeated alone.
 """
 

@@ -1,6 +1,6 @@
 """The semi-circular Mecanum double wheel (SMDW) as rollers: two hubs, half circle and half ellipse.
 
-SMDW thesis, section 4.1: each hub's outline is a half circle of radius Rc joined to a half ellipse
+[guzman2015], section 4.1: each hub's outline is a half circle of radius Rc joined to a half ellipse
 of half-axes Rc and Re; the hubs sit side by side on one axle, half a turn apart, so that on flat
 ground one half circle always carries. At wheel angle 0 the outer hub has its ellipse down (the
 neutral position of Figure 4.3, largest clearance for lateral motion). The hubs of left and right
