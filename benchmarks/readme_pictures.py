@@ -12,12 +12,12 @@ import shutil
 import tempfile
 from pathlib import Path
 
+from benchmarks.theses.smdw_rate_pictures import rate_lines, rate_maps
 from trajopt.pipeline import solve, validate
 from trajopt.problem import load_problem
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.style import in_style, save_figure
 from trajopt.sweeps.store import open_store
-from trajopt.systems.smdw.rate_pictures import rate_lines, rate_maps
 
 FOLDER = Path("docs/pictures")
 PROBLEM = Path("problems/smdw/scenario_1_lateral.toml")

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import OUT, ResultTable, publish
+from benchmarks.peers.timing_picture import draw_growth, growth_exponent
 from trajopt.arrays import Array
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
@@ -27,7 +28,6 @@ from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_at
-from trajopt.report.timing import draw_growth, growth_exponent
 from trajopt.robots.robot import Robot
 from trajopt.robots.robot import robot as shipped
 from trajopt.timing.bounds import bounds_profile

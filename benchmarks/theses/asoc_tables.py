@@ -16,6 +16,13 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.common import OUT, ResultTable, publish
+from benchmarks.theses.asoc_pictures import (
+    curve_figure,
+    front_figure,
+    map_figure,
+    speed_figure,
+    tracks_figure,
+)
 from benchmarks.theses.asoc_reference import (
     FIGURE_9,
     FIGURE_11,
@@ -27,6 +34,7 @@ from benchmarks.theses.asoc_reference import (
     TABLE_9,
     TABLE_10,
 )
+from benchmarks.theses.asoc_suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from benchmarks.theses.asoc_tables_tracking import (
     FAST,
     FULL,
@@ -40,12 +48,12 @@ from benchmarks.theses.asoc_tables_tracking import (
     runs,
     tables_9_and_10,
 )
+from benchmarks.theses.pareto import ParetoFront, pareto_front
 from benchmarks.theses.textbook import TEXTBOOK
 from trajopt.arrays import Array
 from trajopt.errors import TrajoptError
 from trajopt.optimize.base import Budget, Optimizer
 from trajopt.optimize.ipopt import Ipopt
-from trajopt.optimize.pareto import ParetoFront, pareto_front
 from trajopt.optimize.pso import thesis_enhanced, thesis_first
 from trajopt.optimize.search import minimize, optimizer_names
 from trajopt.report.robot_picture import robot_figure
@@ -59,17 +67,9 @@ from trajopt.systems.asoc.modules import (
     link_velocities,
     wheel_steering,
 )
-from trajopt.systems.asoc.pictures import (
-    curve_figure,
-    front_figure,
-    map_figure,
-    speed_figure,
-    tracks_figure,
-)
 from trajopt.systems.asoc.reference import square_corners
 from trajopt.systems.asoc.run import AsocRun
 from trajopt.systems.asoc.soil import soil_named
-from trajopt.systems.asoc.suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from trajopt.systems.asoc.tracking import Knowledge
 
 PACKAGES = ("trajopt", "numpy", "scipy", "casadi", "pymoo", "mujoco", "pybullet")

@@ -14,13 +14,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from benchmarks.common import PROBLEMS
-from trajopt.arrays import Array, fold
-from trajopt.objectives.terminal import TerminalObjective, terminal_objective
-from trajopt.optimize.base import Budget, OptimizeResult
-from trajopt.optimize.search import minimize
-from trajopt.paths.path import Path as RobotPath
-from trajopt.problem import Problem, load_problem
-from trajopt.systems.smdw.search_pictures import (
+from benchmarks.theses.smdw_search_pictures import (
     CostMap,
     SwarmSearch,
     cost_maps_figure,
@@ -28,6 +22,12 @@ from trajopt.systems.smdw.search_pictures import (
     searches_figure,
     swarms_figure,
 )
+from trajopt.arrays import Array, fold
+from trajopt.objectives.terminal import TerminalObjective, terminal_objective
+from trajopt.optimize.base import Budget, OptimizeResult
+from trajopt.optimize.search import minimize
+from trajopt.paths.path import Path as RobotPath
+from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.thesis import through_drives
 
 # rad/s, fitted to Table 5.5 (loosely): what the thesis's drives seem to have done

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
+from benchmarks.peers.timing_picture import draw_growth, growth_exponent
 from trajopt.control.encounter import Obstacle, course
 from trajopt.control.replan import Sensor, run_encounter
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
-from trajopt.report.timing import draw_growth, growth_exponent
 from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.pictures import draw_path, draw_profiles, draw_replan, draw_safe_speed
 from trajopt.timing.scaling import time_scale

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks.theses.smdw_rate_pictures import rate_lines, rate_maps
 from trajopt.errors import ArgumentError
 from trajopt.report.intervals import wilson
 from trajopt.report.sweeps import heat_map, lines, pairs
-from trajopt.systems.smdw.rate_pictures import rate_lines, rate_maps
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.theses.asoc_suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from benchmarks.theses.textbook import TEXTBOOK
 from tests.systems.golden_data import Figures
 from trajopt.robots.mobility import mobility_of
@@ -17,7 +18,6 @@ from trajopt.systems.asoc.isotropy import Contact, best_ratio, mean_isotropy, sp
 from trajopt.systems.asoc.modules import AsocGeometry, largest_pivot
 from trajopt.systems.asoc.reference import constant_speed, square_corners
 from trajopt.systems.asoc.soil import SOILS
-from trajopt.systems.asoc.suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from trajopt.systems.asoc.tracking import Knowledge, track_many
 from trajopt.world.rough import rough_ground
 

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.theses.pareto import nondominated, pareto_front
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import Budget
 from trajopt.optimize.ipopt import Ipopt
-from trajopt.optimize.pareto import nondominated, pareto_front
 from trajopt.optimize.pso import thesis_enhanced, thesis_first
 from trajopt.optimize.search import OPTIMIZERS, minimize, optimizer_names
 from trajopt.systems.asoc.design import (

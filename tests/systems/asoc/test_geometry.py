@@ -5,6 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.theses.asoc_suspension import (
+    POINT_DESIGN,
+    POINT_TRAVEL,
+    FourBar,
+    Linkage,
+    step_travel,
+    suspension_travel,
+)
 from trajopt.errors import ArgumentError
 from trajopt.systems.asoc.modules import (
     AsocGeometry,
@@ -13,14 +21,6 @@ from trajopt.systems.asoc.modules import (
     wheel_positions,
     workspace_radius,
     workspaces_clear,
-)
-from trajopt.systems.asoc.suspension import (
-    POINT_DESIGN,
-    POINT_TRAVEL,
-    FourBar,
-    Linkage,
-    step_travel,
-    suspension_travel,
 )
 
 

@@ -5,6 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.theses.asoc_pictures import (
+    curve_figure,
+    front_figure,
+    map_figure,
+    speed_figure,
+    tracks_figure,
+)
 from benchmarks.theses.asoc_tables import mobility, table_5
 from benchmarks.theses.asoc_tables_tracking import QUICK, difference, interval
 from benchmarks.theses.textbook import TEXTBOOK
@@ -12,13 +19,6 @@ from trajopt.errors import ArgumentError
 from trajopt.report.robot_picture import robot_figure
 from trajopt.report.style import save_figure
 from trajopt.robots.mobility import steering_for
-from trajopt.systems.asoc.pictures import (
-    curve_figure,
-    front_figure,
-    map_figure,
-    speed_figure,
-    tracks_figure,
-)
 
 
 @pytest.mark.parametrize("name", list(TEXTBOOK))

@@ -9,17 +9,17 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
+from benchmarks.theses.powerbot_identify import (
+    NEWTON_PER_POUND,
+    centre_of_gravity,
+    friction_from_pulls,
+)
 from trajopt.errors import InfeasibleError, ProblemError
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
 from trajopt.problem import Problem, load_problem
 from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.constants import FRICTION
-from trajopt.systems.powerbot.identify import (
-    NEWTON_PER_POUND,
-    centre_of_gravity,
-    friction_from_pulls,
-)
 from trajopt.systems.powerbot.limits import (
     thesis_slide_speed,
     thesis_slip_acceleration,

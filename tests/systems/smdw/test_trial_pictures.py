@@ -11,9 +11,9 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
+from benchmarks.theses import smdw_search_pictures as search_pictures
 from trajopt.problem import load_problem
 from trajopt.systems.smdw import pictures as smdw
-from trajopt.systems.smdw import search_pictures
 from trajopt.systems.smdw import trial_pictures as smdw_trials
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, loc8_smdw
 from trajopt.systems.smdw.geometry import meet_step
