@@ -138,11 +138,9 @@ def test_thesis_braking_downhill_is_unsafe() -> None:
     thesis = time_scale(
         down, task.replace({"limits.variant": "thesis"}).limits, robot=shipped("powerbot")
     )
-    rows = (
-        task.replace({"limits.variant": None})
-        .limits[-2]
-        .rows(sample_path(down, thesis.s[:-1]), shipped("powerbot"))
-    )
+    physical = task.replace({"limits.variant": None}).limits
+    slip = next(limit for limit in physical if limit.name == "slip")
+    rows = slip.rows(sample_path(down, thesis.s[:-1]), shipped("powerbot"))
     used = rows.a * thesis.sdd[:, None] + rows.b * thesis.sd[:-1, None] ** 2
     assert np.any(used > rows.c * 1.0 + 0.05)
 
