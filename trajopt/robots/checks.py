@@ -24,7 +24,7 @@ from trajopt.robots.mobility import (
 )
 from trajopt.robots.robot import Robot
 
-FEWEST_ROLLERS = 12  # around a wheel; with fewer it hobbles (SOURCES 000: measured in Bullet)
+FEWEST_ROLLERS = 12  # around a wheel; with fewer it hobbles, measured in Bullet
 _INSIDE = 1e-6  # m by which a wheel may touch its outline
 
 
