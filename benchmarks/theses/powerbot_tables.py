@@ -589,7 +589,7 @@ def physics(numbers: Sequence[int]) -> ResultTable:
 
 def draw_plans() -> list[str]:
     """Pictures of the plans and of the safe speed; their names."""
-    from trajopt.systems.powerbot.pictures import draw_path, draw_profiles, draw_safe_speed
+    from benchmarks.theses.powerbot_figures import draw_path, draw_profiles, draw_safe_speed
 
     FIGURES.mkdir(parents=True, exist_ok=True)
     made = []

@@ -18,26 +18,21 @@ from matplotlib.figure import Figure
 from benchmarks.common import OUT, PROBLEMS
 from benchmarks.theses import closed_loop, smdw_printed
 from benchmarks.theses.climb import NAMES, climb_from, plan_of
+from benchmarks.theses.smdw_trial_figures import (
+    ClimbCell,
+    causes_figure,
+    climb_rates_figure,
+    endings_figure,
+    phase_map_figure,
+)
+from benchmarks.theses.smdw_wheel_figures import cam_figure, setups_figure, wheel_at_step_figure
 from trajopt.problem import load_problem
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.systems.smdw.climb import Climb, judge, reached, record_climb, run_approach
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, loc8_smdw
-from trajopt.systems.smdw.pictures import (
-    cam_figure,
-    geometry_figure,
-    setups_figure,
-    wheel_at_step_figure,
-)
+from trajopt.systems.smdw.pictures import geometry_figure
 from trajopt.systems.smdw.planner import Plan, configurations_of
-from trajopt.systems.smdw.trial_pictures import (
-    ClimbCell,
-    Motions,
-    causes_figure,
-    climb_rates_figure,
-    endings_figure,
-    motions_figure,
-    phase_map_figure,
-)
+from trajopt.systems.smdw.trial_pictures import Motions, motions_figure
 from trajopt.systems.smdw.trials import approach_command, step_scene
 
 # Share of the thesis's ten runs that climbed, least and greatest (sections 6.1, 6.1.1, 6.2); "most"

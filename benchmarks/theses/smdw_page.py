@@ -9,9 +9,9 @@ from itertools import pairwise
 
 from benchmarks.common import OUT, ResultTable
 from benchmarks.theses.smdw_figures import SOURCE_NAMES, phase_shares
+from benchmarks.theses.smdw_trial_figures import ClimbCell
 from trajopt.report.files import markdown
 from trajopt.report.intervals import wilson
-from trajopt.systems.smdw.trial_pictures import ClimbCell
 
 CLIMBS = 0.5  # share of its runs from which a phase counts as one that climbs, chosen
 PACKAGES = ("numpy", "mujoco", "pybullet")

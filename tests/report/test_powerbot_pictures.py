@@ -9,6 +9,7 @@ import pytest
 from matplotlib.image import imread
 
 from benchmarks.peers.timing_picture import draw_growth, growth_exponent
+from benchmarks.theses.powerbot_figures import draw_path, draw_profiles, draw_safe_speed
 from trajopt.control.encounter import Obstacle, course
 from trajopt.control.replan import Sensor, run_encounter
 from trajopt.errors import ArgumentError
@@ -16,7 +17,7 @@ from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
 from trajopt.robots.robot import robot as shipped
-from trajopt.systems.powerbot.pictures import draw_path, draw_profiles, draw_replan, draw_safe_speed
+from trajopt.systems.powerbot.pictures import draw_replan
 from trajopt.timing.scaling import time_scale
 
 POINTS = (100, 1000, 10_000)

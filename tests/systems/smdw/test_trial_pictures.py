@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from benchmarks.theses import smdw_search_pictures as search_pictures
+from benchmarks.theses import smdw_trial_figures, smdw_wheel_figures
 from trajopt.problem import load_problem
 from trajopt.systems.smdw import pictures as smdw
 from trajopt.systems.smdw import trial_pictures as smdw_trials
@@ -22,12 +23,12 @@ from trajopt.systems.smdw.planner import plan_climb
 FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"
 
 
-def cell(source: str, successes: int, name: str = "lateral") -> smdw_trials.ClimbCell:
-    return smdw_trials.ClimbCell("mujoco", 0.05, name, source, successes, 20, (0.0, 0.0))
+def cell(source: str, successes: int, name: str = "lateral") -> smdw_trial_figures.ClimbCell:
+    return smdw_trial_figures.ClimbCell("mujoco", 0.05, name, source, successes, 20, (0.0, 0.0))
 
 
 def test_bars_are_the_shares_and_intervals_hold_them() -> None:
-    axes = smdw_trials.climb_rates_figure([cell("exact", 20), cell("uniform", 5)]).axes[0]
+    axes = smdw_trial_figures.climb_rates_figure([cell("exact", 20), cell("uniform", 5)]).axes[0]
     bars = [patch.get_height() for patch in axes.patches]
     assert bars == [1.0, 0.25]
     assert axes.get_title(loc="center") + axes.get_title(loc="left") == "mujoco, step of 5 cm"
@@ -36,19 +37,21 @@ def test_bars_are_the_shares_and_intervals_hold_them() -> None:
 
 def test_a_cell_without_trials_is_named_not_drawn_as_zero() -> None:
     cells = [cell("exact", 20), cell("uniform", 5), cell("exact", 3, "forward35")]
-    axes = smdw_trials.climb_rates_figure(cells).axes[0]
+    axes = smdw_trial_figures.climb_rates_figure(cells).axes[0]
     assert len(axes.patches) == 3
     assert [t.get_text() for t in axes.texts] == ["20/20", "5/20", "3/20", "not run"]
 
 
 def test_the_phase_map_shows_every_share() -> None:
     shares = {("lateral", 0.05): {(8.0, 0.8): [0.0, 1.0], (4.0, 0.5): [0.5, 1.0]}}
-    image = smdw_trials.phase_map_figure(shares, [-0.6, 0.6]).axes[0].get_images()[0]
+    image = smdw_trial_figures.phase_map_figure(shares, [-0.6, 0.6]).axes[0].get_images()[0]
     assert np.array_equal(np.asarray(image.get_array()), [[0.0, 1.0], [0.5, 1.0]])
 
 
 def test_causes_show_a_share_a_value_and_its_interval() -> None:
-    figure = smdw_trials.causes_figure({"gap, cm": {"lateral": {2.0: (20, 20), 5.0: (5, 20)}}})
+    figure = smdw_trial_figures.causes_figure(
+        {"gap, cm": {"lateral": {2.0: (20, 20), 5.0: (5, 20)}}}
+    )
     line = figure.axes[0].get_lines()[0]
     assert np.asarray(line.get_ydata()) == pytest.approx([1.0, 0.25])
     assert [tick.get_text() for tick in figure.axes[0].get_xticklabels()] == ["2", "5"]
@@ -56,7 +59,9 @@ def test_causes_show_a_share_a_value_and_its_interval() -> None:
 
 def test_every_ending_is_drawn_in_its_units() -> None:
     errors = np.array([[0.002, 0.0175, 0.03], [0.004, 0.0087, 0.05]])
-    figure = smdw_trials.endings_figure({"noiseless": errors}, {"noiseless": (0.005, 0.0087, 0.06)})
+    figure = smdw_trial_figures.endings_figure(
+        {"noiseless": errors}, {"noiseless": (0.005, 0.0087, 0.06)}
+    )
     points, bound = figure.axes[0].get_lines()[:2]
     assert np.asarray(points.get_xdata()) == pytest.approx([2.0, 4.0])
     assert np.asarray(bound.get_xdata()) == pytest.approx([5.0, 5.0])
@@ -105,10 +110,10 @@ def test_swarms_and_cost_maps_show_what_they_are_given() -> None:
 
 def test_figure_6_9_stands_the_step_at_the_highest_that_the_hub_clears() -> None:
     theta, alpha = math.radians(-30), math.radians(-35)
-    top = smdw.clearance_at(DEFAULT_WHEEL, theta, alpha)
+    top = smdw_wheel_figures.clearance_at(DEFAULT_WHEEL, theta, alpha)
     assert float(meet_step(DEFAULT_WHEEL, theta, alpha, top).clearance) >= top
     assert float(meet_step(DEFAULT_WHEEL, theta, alpha, top + 1e-3).clearance) < top + 1e-3
-    axes = smdw.wheel_at_step_figure(DEFAULT_WHEEL, alpha, theta, 0.035).axes
+    axes = smdw_wheel_figures.wheel_at_step_figure(DEFAULT_WHEEL, alpha, theta, 0.035).axes
     assert f"{100 * top:.1f} cm" in axes[0].get_title(loc="left") + axes[0].get_title()
     assert axes[1].get_lines()[-1].get_ydata() == pytest.approx(
         100 * float(meet_step(DEFAULT_WHEEL, theta, alpha, 0.035).clearance)
