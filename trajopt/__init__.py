@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from trajopt.robots.robot import Robot, robot, robot_names
     from trajopt.simulate.check import ValidationReport
     from trajopt.sweeps.sweeps import sweep
-    from trajopt.systems.smdw.planner import plan_climb
     from trajopt.timing.scaling import time_scale
     from trajopt.timing.trajectory import State, Trajectory
     from trajopt.world.terrain import Flat
@@ -76,7 +75,6 @@ _HOME = {
     "load_problem": "trajopt.problem",
     "minimize": "trajopt.optimize.search",
     "optimize_path": "trajopt.refine.path",
-    "plan_climb": "trajopt.systems.smdw.planner",
     "robot": "trajopt.robots.robot",
     "robot_names": "trajopt.robots.robot",
     "solve": "trajopt.pipeline",
@@ -116,7 +114,6 @@ __all__ = [
     "load_problem",
     "minimize",
     "optimize_path",
-    "plan_climb",
     "robot",
     "robot_names",
     "solve",

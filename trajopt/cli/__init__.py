@@ -3,6 +3,7 @@ input."""
 
 from __future__ import annotations
 
+import importlib
 import sys
 
 import typer
@@ -10,7 +11,6 @@ from rich.console import Console
 
 from trajopt.cli import bench, paths, robot, search, sweep
 from trajopt.errors import TrajoptError
-from trajopt.systems.smdw import commands
 
 app = typer.Typer(
     add_completion=False,
@@ -18,11 +18,12 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Plan, time and check motions of wheeled ground robots.",
 )
+# modules of systems that bring commands of their own (``COMMANDS``): one line a system
+SYSTEMS = ("trajopt.systems.smdw.commands",)
 for command in (
     search.solve,
     search.validate,
-    commands.plan,
-    commands.climb,
+    *(command for name in SYSTEMS for command in importlib.import_module(name).COMMANDS),
     paths.explain,
     paths.export,
     paths.compare,

@@ -52,11 +52,11 @@ class Body:
 class Robot:
     """Wheels on a body, from a ``description`` (see ``trajopt.robots.description``).
 
-    Made by ``robot("loc8")``, ``Robot.load("mine.toml")`` or a builder such as
+    Made by ``robot("car")``, ``Robot.load("mine.toml")`` or a builder such as
     ``Robot.differential``.
 
     >>> from trajopt.robots import robot
-    >>> robot("loc8").inverse.shape
+    >>> robot("car").inverse.shape
     (4, 3)
     """
 

@@ -161,7 +161,7 @@ def _job(
         if not hasattr(limit, "rows") or isinstance(limit, type):
             raise ArgumentError("limits", limit, "limits, as Speed(1.0)")
     if robot is not None and not isinstance(robot, Robot):
-        raise ArgumentError("robot", robot, "a Robot, as robot('loc8'), or None")
+        raise ArgumentError("robot", robot, "a Robot, as robot('car'), or None")
     if ground is not None and not hasattr(ground, "check"):
         raise ArgumentError("ground", ground, "the shape of the ground, as Flat(), or None")
     names = [limit.name for limit in limits]

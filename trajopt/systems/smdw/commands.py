@@ -197,3 +197,6 @@ def _chosen(maneuver: Maneuver, name: str | None) -> Plan:
             "--configuration", name, "one that has a plan: " + ", ".join(plans) + why
         )
     return maneuver.plans[0] if name is None else plans[name]
+
+
+COMMANDS = (plan, climb)  # what the command line gets from this system
