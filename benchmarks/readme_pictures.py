@@ -48,7 +48,7 @@ def climb_rates(store: Path) -> None:
             print(f"wrote {save_figure(figure, FOLDER / name)}")
     sound = frame[frame["status"] == "done"].dropna(subset=["climbed"])
     print(f"{len(frame)} rows, {len(sound)} trials count")
-    for column in ("obstacle.height", "friction", "heading_error", "torque"):
+    for column in ("obstacles.step.height", "friction", "heading_error", "torque"):
         print(
             sound.pivot_table(index=column, columns="configuration", values="climbed")
             .mul(100)

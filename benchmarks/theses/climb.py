@@ -121,7 +121,7 @@ def climb_from(
     """Sub-test 2 from the plan's target with random state errors and friction, and the given wheel
     angles (4,)."""
     x, y, yaw = plan.target.pose
-    dx = min(float(rng.normal(0.0, POSITION_SD)), problem.approach.gap - NEAREST)
+    dx = min(float(rng.normal(0.0, POSITION_SD)), problem.climb.gap - NEAREST)
     shift = np.array([dx, rng.normal(0.0, POSITION_SD), yaw_error + rng.normal(0.0, YAW_SD)])
     angles = wheels + rng.normal(0.0, WHEEL_SD, 4)
     pose = before_step(problem, np.array([x, y, yaw]) + shift)
@@ -311,7 +311,7 @@ def _caused(
     problem: Problem, configuration: Configuration, cause: str, value: float, number: int
 ) -> Climb:
     if cause == "gap, cm":
-        problem = problem.replace({"approach.gap": value / 100})
+        problem = problem.replace({"climb.gap": value / 100})
     turned = math.radians(value) if cause == "heading error at the end, deg" else 0.0
     speed = value if cause == "approach speed, rad/s" else CLIMB_SPEED
     target, rng = approach_target(problem, configuration), np.random.default_rng([number, 101])

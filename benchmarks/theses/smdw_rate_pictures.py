@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _COLOURS = (BLUE, VERMILION, GREEN)
 _NEEDED = (
     "configuration",
-    "obstacle.height",
+    "obstacles.step.height",
     "friction",
     "heading_error",
     "torque",
@@ -45,12 +45,12 @@ def rate_maps(frame: pd.DataFrame) -> Figure:
     rows, exploded = _sound(frame)
     names = _configurations(rows)
     figure = new_figure(2.9)
-    heights, frictions = (sorted(set(rows[name])) for name in ("obstacle.height", "friction"))
+    heights, frictions = (sorted(set(rows[name])) for name in ("obstacles.step.height", "friction"))
     panels: Sequence[Axes] = figure.subplots(1, len(names), squeeze=False, sharey=True)[0]
     for axes, name in zip(panels, names, strict=True):
         here = rows[rows["configuration"] == name]
         cells = here.pivot_table(
-            index="obstacle.height", columns="friction", values="climbed", aggfunc="mean"
+            index="obstacles.step.height", columns="friction", values="climbed", aggfunc="mean"
         )
         cells = cells.reindex(
             index=heights, columns=frictions
@@ -78,7 +78,9 @@ def rate_maps(frame: pd.DataFrame) -> Figure:
     figure.colorbar(
         image, ax=list(panels), label="climb rate", format=lambda v, _: f"{100 * v:.0f} %"
     )
-    each = len(rows) / max(1, len(rows.groupby(["configuration", "obstacle.height", "friction"])))
+    each = len(rows) / max(
+        1, len(rows.groupby(["configuration", "obstacles.step.height", "friction"]))
+    )
     figure.suptitle(
         f"Climb rate in % over step height and friction: {len(rows)} trials, about {each:.0f} a cell"
         + (f"; {exploded} left physics" if exploded else ""),

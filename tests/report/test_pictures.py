@@ -15,10 +15,9 @@ from trajopt.errors import ArgumentError
 from trajopt.optimize.base import History, Status
 from trajopt.pipeline import Solution
 from trajopt.report.convergence_picture import convergence_figure
-from trajopt.report.ground_plan import obstacle_strip, outline
+from trajopt.report.path_picture import path_figure
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.profile_picture import band_times, limit_use, profile_figure
-from trajopt.robots.robot import robot as shipped
 from trajopt.simulate.check import ValidationReport
 
 
@@ -106,7 +105,8 @@ def test_convergence_of_any_history(
     )
     solution = replace(exact, search=search)
     file = tmp_path / "convergence.png"
-    figure = convergence_figure(solution)
+    assert solution.search is not None
+    figure = convergence_figure(solution, solution.search)
     figure.savefig(file)
     broken = n == 0 or any(v > 1e-9 for v in violation)
     assert len(figure.axes) == (2 if broken else 1)
@@ -144,20 +144,14 @@ def test_profile_marks_broken_limits(through_actuators: Solution) -> None:
     assert "broken" in figure.legends[0].get_title().get_text()
 
 
-def test_obstacle_touches_the_robot_at_the_goal(exact: Solution) -> None:
-    found = obstacle_strip(exact.problem, shipped("loc8"), 1.2)
-    assert found is not None
-    strip, yaw = found
-    assert (
-        yaw == exact.problem.start.pose[2]
-    )  # the scenarios meet a step across their start heading
-    reach = outline(shipped("loc8"), np.asarray(exact.problem.goal.pose))[:, 0].max()
-    assert strip[:, 0].min() == pytest.approx(reach)
-    flat = exact.problem.replace({"scene.obstacle_height": 0.0})
-    assert obstacle_strip(flat, shipped("loc8"), 1.2) is None
-    behind = exact.problem.replace({"start.pose": [0.0, 0.0, 3.0]})
-    meets = obstacle_strip(behind, shipped("loc8"), 1.2)
-    assert meets is not None
-    assert meets[1] == pytest.approx(
-        exact.problem.goal.pose[2] + np.pi / 2
-    )  # left wheels lead: leftwards
+def test_what_stands_there_is_drawn_and_where_the_outline_crosses_it(exact: Solution) -> None:
+    assert exact.path is not None
+    labels = path_figure(exact, exact.path).axes[0].get_legend_handles_labels()[1]
+    assert "step, 0.05 m high" in labels
+    assert not any("crosses" in label for label in labels)
+    crossing = replace(exact, problem=exact.problem.replace({"obstacles.step.place": [1.0, 0.0]}))
+    labels = path_figure(crossing, exact.path).axes[0].get_legend_handles_labels()[1]
+    assert any("crosses" in label for label in labels)
+    flat = replace(exact, problem=exact.problem.replace({"obstacles": None}))
+    labels = path_figure(flat, exact.path).axes[0].get_legend_handles_labels()[1]
+    assert not any("step" in label for label in labels)

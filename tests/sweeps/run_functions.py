@@ -26,7 +26,7 @@ def cheap(case: Case) -> dict[str, Any]:
 
 def friction(case: Case, problem: Any) -> float:
     """What the problem of this case has, times a value that only this function knows."""
-    return float(problem.limits.friction) * float(case["factor"])
+    return float(problem.ground.friction) * float(case["factor"])
 
 
 def paced(case: Case) -> dict[str, Any]:

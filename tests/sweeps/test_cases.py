@@ -224,17 +224,17 @@ def sweep_file(folder: Path, text: str) -> Path:
     ("text", "words"),
     [
         ("bad = 1", "bad"),
-        ('[axes."limits.frictoin"]\nvalues = [1.0]', "'friction'"),
+        ('[axes."ground.frictoin"]\nvalues = [1.0]', "'friction'"),
         ("[axes.height]\nvalues = [1.0]", "height"),
-        ('[axes."limits.friction"]\nvalues = [-1.0]', "greater than 0"),
+        ('[axes."ground.friction"]\nvalues = [-1.0]', "greater than 0"),
         ('[axes."run.optimiser"]\nvalues = ["pso"]', "run.optimizer"),
         ('[axes."run.seed"]\nvalues = [0.5, 1.0]', "run.seed = 0.5"),
         ('solve.engine = "bullet"', "run.engine = 'bullet': expected one of none, pybullet"),
         ("solve.evaluation = 9", "run.evaluation = 9: expected one of run.optimizer"),
         ('solve.engine = "none"\n[axes."run.engine"]\nvalues = ["none"]', "each name once"),
-        ('exclude = ["x >"]\n[axes."limits.friction"]\nvalues = [1.0]', "x >"),
+        ('exclude = ["x >"]\n[axes."ground.friction"]\nvalues = [1.0]', "x >"),
         (
-            'exclude = ["limits.friction > 0"]\n[axes."limits.friction"]\nvalues = [1.0]',
+            'exclude = ["ground.friction > 0"]\n[axes."ground.friction"]\nvalues = [1.0]',
             "at least one case",
         ),
     ],
@@ -245,14 +245,14 @@ def test_wrong_sweep_files_are_told(tmp_path: Path, text: str, words: str) -> No
 
 
 def test_problem_changes_identity(tmp_path: Path) -> None:
-    text = '[axes."limits.friction"]\nvalues = [0.3, 0.4]\n'
+    text = '[axes."ground.friction"]\nvalues = [0.3, 0.4]\n'
     one = load_sweep(sweep_file(tmp_path, text)).table.ids
     two = load_sweep(sweep_file(tmp_path, text + "[solve]\noptimizer = 'pso'\n")).table.ids
     assert not set(one.tolist()) & set(two.tolist())
 
 
 def test_solve_is_short_for_an_axis_of_one_value(tmp_path: Path) -> None:
-    axis = '[axes."limits.friction"]\nvalues = [0.3, 0.4]\n'
+    axis = '[axes."ground.friction"]\nvalues = [0.3, 0.4]\n'
     short = load_sweep(sweep_file(tmp_path, axis + "[solve]\nevaluations = 7\n")).table
     long = axis + '[axes."run.evaluations"]\nvalues = [7]\n'
     assert set(short.ids.tolist()) == set(load_sweep(sweep_file(tmp_path, long)).table.ids.tolist())
@@ -270,7 +270,6 @@ def test_solve_is_short_for_an_axis_of_one_value(tmp_path: Path) -> None:
             'run = "tests.sweeps.run_functions:cheap"\nsolve.seed = 1\n[axes.x]\nvalues = [1]',
             "no such table",
         ),
-        (f'problem = "{ROOT}/problems/smdw/step_5cm.toml"\n[axes.repeat]\nvalues = [1]', "run"),
         (
             f'problem = "{ROOT}/problems/smdw/step_5cm.toml"\n'
             'run = "tests.sweeps.run_functions:friction"\n[axes."run.seed"]\nvalues = [1]',
@@ -287,9 +286,9 @@ def test_wrong_run_functions_are_told(tmp_path: Path, text: str, words: str) -> 
 @pytest.mark.parametrize(
     ("file", "key"),
     [
-        ("smdw/scenario_1_lateral", "limits.friction"),
-        ("smdw/step_5cm", "limits.friction"),
-        ("powerbot/experiment_1", "limits.friction"),
+        ("smdw/scenario_1_lateral", "ground.friction"),
+        ("smdw/step_5cm", "ground.friction"),
+        ("powerbot/experiment_1", "ground.friction"),
     ],
 )
 def test_a_function_gets_the_problem_of_its_case(tmp_path: Path, file: str, key: str) -> None:

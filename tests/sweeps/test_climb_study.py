@@ -10,7 +10,7 @@ from trajopt.sweeps.cases import Case
 from trajopt.sweeps.sweepfile import load_sweep
 from trajopt.systems.smdw import study as climb_study
 from trajopt.systems.smdw.climb import Climb, Outcome, run_climb
-from trajopt.systems.smdw.planner import configurations, wheel_of
+from trajopt.systems.smdw.planner import configurations_of
 
 
 def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -28,7 +28,7 @@ def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPa
     row = plan.run(case)
     step = seen[0].step
     assert (step.height, step.friction, step.torque) == (
-        case["obstacle.height"],
+        case["obstacles.step.height"],
         case["friction"],
         case["torque"],
     )
@@ -39,8 +39,8 @@ def test_all_configurations_of_the_study_are_there_and_others_are_named() -> Non
     plan = load_sweep(ROOT / "problems" / "sweeps" / "climb_rate.toml")
     problem = plan.run.problem  # type: ignore[attr-defined]
     wanted = {row["configuration"] for row in plan.table.rows()}
-    for height in {row["obstacle.height"] for row in plan.table.rows()}:
-        step = problem.replace({"obstacle.height": height}).obstacle
-        assert wanted <= {c.name for c in configurations(wheel_of(problem), step)}
+    for height in {row["obstacles.step.height"] for row in plan.table.rows()}:
+        changed = problem.replace({"obstacles.step.height": height})
+        assert wanted <= {c.name for c in configurations_of(changed)}
     with pytest.raises(ArgumentError, match="lateral left"):
         climb_study.trial(Case("0" * 32, {"configuration": "on its head"}), problem)

@@ -6,7 +6,10 @@ from __future__ import annotations
 import csv
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -92,14 +95,15 @@ def test_starts_scatter_as_stated(problem: Problem, plan: Plan) -> None:
 def test_a_climb_starts_before_the_step_whatever_its_direction(
     problem: Problem, direction: float
 ) -> None:
-    obstacle = step_of(problem).model_copy(update={"direction": direction})
-    turned = problem.model_copy(update={"obstacle": obstacle})
-    normal, place = np.array(obstacle.normal), np.array(obstacle.place)
+    step = replace(step_of(problem), direction=direction)
+    scene = replace(problem.scene, obstacles=(step,))
+    turned = cast(Problem, SimpleNamespace(scene=scene, climb=problem.climb, robot=problem.robot))
+    normal, place = np.array(step.normal), np.array(step.place)
     for yaw in (0.0, 1.1):
         inside = np.array([*(place + 0.1 * normal), yaw])
         x, y, kept = before_step(turned, inside)
         corner = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-        reach = (np.array(turned.platform.footprint) @ corner.T + [x, y]) @ normal
+        reach = (np.array(turned.robot.footprint) @ corner.T + [x, y]) @ normal
         assert kept == yaw
         assert normal @ place - reach.max() == pytest.approx(NEAREST, abs=1e-12)
         assert np.array([-normal[1], normal[0]]) @ (np.array([x, y]) - inside[:2]) == pytest.approx(

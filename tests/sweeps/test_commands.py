@@ -61,7 +61,7 @@ SWEEP = """
 problem = "{problem}"
 [axes."run.optimizer"]
 values = ["lattice"]
-[axes."limits.friction"]
+[axes."ground.friction"]
 values = [0.4, 0.6]
 """
 
@@ -92,7 +92,7 @@ def test_report_draws_a_case_of_a_problem_as_solve_does(tmp_path: Path) -> None:
     assert json.loads((out / "summary.json").read_text())["cost"] == pytest.approx(
         row["cost"], rel=1e-12
     )
-    assert json.loads((out / "case.json").read_text())["limits.friction"] == row["limits.friction"]
+    assert json.loads((out / "case.json").read_text())["ground.friction"] == row["ground.friction"]
     reported(str(out), "--out", str(tmp_path / "again"))
     assert (tmp_path / "again" / "path.png").stat().st_size > 5_000
     file.write_text(file.read_text().replace("0.4, 0.6", "0.5"))

@@ -56,7 +56,7 @@ def test_climb_rates_are_drawn_as_they_are() -> None:
     rows = [
         {
             "configuration": name,
-            "obstacle.height": height,
+            "obstacles.step.height": height,
             "friction": friction,
             "heading_error": error,
             "torque": torque,

@@ -14,9 +14,12 @@ from benchmarks.theses.powerbot_identify import (
     centre_of_gravity,
     friction_from_pulls,
 )
+from trajopt.control.commands import commands
 from trajopt.errors import InfeasibleError, ProblemError
+from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
+from trajopt.pipeline import solve
 from trajopt.problem import Problem, load_problem
 from trajopt.robots.robot import robot as shipped
 from trajopt.systems.powerbot.constants import FRICTION
@@ -146,9 +149,8 @@ def test_thesis_braking_downhill_is_unsafe() -> None:
 
 
 def test_slope_beyond_the_grade_is_refused() -> None:
-    task = problem(4).replace(
-        ramps=[{"foot": [-44.63, -30.4], "direction": -1.588, "length": 4.29, "height": 0.9}]
-    )
+    task = problem(4).replace({"ground.ramps.0.height": 0.9})
+    assert "grade" in solve(task).faults[0]
     with pytest.raises(InfeasibleError, match="grade"):
         time_scale(task.path, task.limits, robot=task.robot, ground=task.scene.ground)
 
@@ -169,7 +171,19 @@ def test_ramp_keeps_the_curve_in_the_plane() -> None:
     ("change", "key"),
     [
         ({"path": {"start_rate": -1.0}}, "start_rate"),
-        ({"path": {"knots": [[0, 0], [0, 0]]}}, "knots"),
+        ({"path": {"points": [[0, 0], [0, 0]]}}, "points"),
+        ({"path": {"points": None}}, "points or file"),
+        ({"path": {"headings": [0.0] * 5}}, "heading"),
+        ({"path": {"heading": "free", "headings": [0.0] * 5}}, "cannot move in every direction"),
+        ({"path": {"closed": True}}, "path.closed"),
+        ({"path": {"goal_rate": None}}, "goal_rate"),
+        ({"start": {"pose": [0.0, 0.0, 0.0]}}, "start.pose"),
+        ({"space": {"x": [0.0, 1.0], "y": [0.0, 1.0]}}, "take out \\[space\\]"),
+        ({"ground": {"grade": 0.1}}, "ramps and grade"),
+        ({"limits": {"variant": "magic"}}, "thesis"),
+        ({"limits": {"slip_share": 0.5, "slip": False}}, "slip_share"),
+        ({"encounters": [{"appears": 1.0, "clears_after": 1.0}]}, "encounters\\[0\\].distance"),
+        ({"profile": {"places": [0, 99], "speeds": [1, 1]}}, "profile.places"),
         ({"limits": {"frictoin": 0.3}}, "frictoin"),
         ({"limits": {"deceleration": None}}, "deceleration"),
         ({"profile": {"places": [1, 0], "speeds": [1, 1]}}, "places"),
@@ -183,16 +197,21 @@ def test_wrong_files_are_refused_in_one_line(change: dict[str, object], key: str
 
 def test_dotted_keys_replace_and_override_as_in_other_problem_files() -> None:
     task = problem(4)
-    assert (
-        task.replace({"limits.friction": 0.5, "path.start_rate": np.float64(0.4)}).limits.friction
-        == 0.5
-    )
-    assert task.replace(**{"limits.safety_speed": 0.4}).limits.safety_speed == 0.4
-    assert task.replace({"limits.friction": None}).limits.friction is None
-    assert task.replace(limits={"friction": 0.4}).limits.speed == task.limits.speed
+    changed = task.replace({"ground.friction": 0.5, "path.start_rate": np.float64(0.4)})
+    assert changed.scene.friction == 0.5
+    assert changed.limits_section == task.limits_section
+    slower = task.replace(**{"limits.safety_speed": 0.4})
+    assert Speed(0.4, name="safety_speed") in slower.limits
+    assert Speed(0.3) in task.replace(limits={"speed": 0.3}).limits
+    assert {m.name for m in task.limits} - {
+        m.name for m in task.replace({"limits.slip": False}).limits
+    } == {
+        "thesis_slip",
+        "thesis_slide",
+    }
     file = ROOT / "problems" / "powerbot" / "experiment_4.toml"
-    assert load_problem(file, {"limits.friction": 0.5}) == task.replace({"limits.friction": 0.5})
-    for wrong in ("limits.frction", "limits.friction.deep"):
+    assert load_problem(file, {"ground.friction": 0.5}) == task.replace({"ground.friction": 0.5})
+    for wrong in ("ground.frction", "ground.friction.deep"):
         with pytest.raises(ProblemError, match=wrong):
             task.replace({wrong: 1.0})
         with pytest.raises(ProblemError, match=wrong):
@@ -232,3 +251,33 @@ def test_centre_of_gravity_of_appendix_3() -> None:
     assert found.height.uncertainty == pytest.approx(
         math.sqrt(2) * 0.5 * 0.35 / (148 * math.tan(math.asin(0.062 / 0.35))), rel=1e-4
     )
+
+
+@pytest.mark.parametrize("speeds", [(0.1, 0.1), (0.1, 0.05)])
+def test_a_profile_bounds_the_commands_on_the_whole_path(speeds: tuple[float, float]) -> None:
+    """Places end 12 m before the path does: the last speed holds on."""
+    solution = solve(problem(6).replace({"profile.places": [0, 1], "profile.speeds": speeds}))
+    assert solution.holds, solution.faults
+    assert solution.trajectory is not None
+    orders = commands(solution.trajectory, 0.5)
+    assert max(orders.left.max(), orders.right.max()) <= 0.1 + 1e-6
+    assert solution.duration > 13.0 / 0.1
+
+
+def test_encounters_halt_the_motion_and_let_it_go_on() -> None:
+    solution = solve(problem(3))
+    assert solution.holds, solution.faults
+    assert solution.details is not None
+    notes = solution.details.notes
+    free = solve(problem(3).replace({"encounters": None}))
+    assert free.duration == solution.duration
+    assert "with_encounters" not in free.details.notes  # type: ignore[union-attr]
+    seen = notes["with_encounters"]
+    assert seen["arrived"]
+    assert not seen["hit"]
+    assert seen["standing_s"] > 0.0
+    assert seen["duration_s"] > solution.duration + seen["standing_s"]
+    longer = solve(problem(3).replace({"encounters.1.clears_after": 9.0})).details
+    assert longer is not None
+    assert longer.notes["with_encounters"]["standing_s"] > seen["standing_s"] + 5.0
+    assert notes["printed"]["ours"] == {"length": solution.path.length, "time": solution.duration}  # type: ignore[union-attr]

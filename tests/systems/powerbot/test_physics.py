@@ -131,7 +131,7 @@ def with_friction(task: Problem, share: float) -> list[Limit]:
     kept = [
         x for x in task.replace({"limits.variant": None}).limits if x.name not in ("slip", "tip")
     ]
-    return [*kept, Slip(share * task.friction, per_wheel=True)]
+    return [*kept, Slip(share * task.ground.friction, per_wheel=True)]
 
 
 def assert_safe_and_at_the_goal(seen: DrivenEncounter) -> None:
@@ -186,7 +186,7 @@ def test_experiment_3_among_its_obstacles(kind: str) -> None:
     """Both obstacles at the printed times: as printed, leaving the lane on a track, crossing at a
     walking pace."""
     task = problem(3)
-    assert [(o.appears, o.clears_after) for o in task.obstacles] == [(9.95, 0.59), (21.2, 2.74)]
+    assert [(o.appears, o.clears_after) for o in task.encounters] == [(9.95, 0.59), (21.2, 2.74)]
     where = course(
         time_scale(task.path, with_friction(task, 0.5), robot=ROBOT),
         ROBOT,
@@ -198,17 +198,17 @@ def test_experiment_3_among_its_obstacles(kind: str) -> None:
         "cross": Sensor(2.5, 0.1, 0.1, unseen_speed=0.8),
     }[kind]
     visitors = {
-        "stand": [Visitor(o.appears, o.clears_after, o.distance) for o in task.obstacles],
+        "stand": [Visitor(o.appears, o.clears_after, o.distance) for o in task.encounters],
         "leave": [
             Visitor(o.appears, 10.0, o.distance, 0.49 - 0.1 * o.clears_after, 0.1)
-            for o in task.obstacles
+            for o in task.encounters
         ],
-        "cross": [Visitor(o.appears - 3.0, 8.0, 2.0, -2.9, 0.8) for o in task.obstacles],
+        "cross": [Visitor(o.appears - 3.0, 8.0, 2.0, -2.9, 0.8) for o in task.encounters],
     }[kind]
     seen = drive_encounter(
         where,
         powerbot_drive(ROBOT),
-        Floor(task.friction),
+        Floor(task.ground.friction),
         sensor,
         visited_world(visitors, where.outline),
         longest=200.0,
@@ -225,11 +225,12 @@ def test_experiment_3_among_its_obstacles(kind: str) -> None:
 @pytest.mark.parametrize("manner", ["below", "least_squares"])
 def test_experiment_6_along_its_profile(manner: Literal["below", "least_squares"]) -> None:
     task = problem(6)
-    profile = task.speed_profile()
-    assert profile is not None
-    plan = follow(task.path, profile, with_friction(task, 0.7), robot=ROBOT, manner=manner)
+    assert task.profile is not None
+    plan = follow(
+        task.path, task.profile.bound, with_friction(task, 0.7), robot=ROBOT, manner=manner
+    )
     seen = drive_in_pybullet(
-        plan.trajectory, powerbot_drive(ROBOT), Floor(task.friction), tracker=Tracker()
+        plan.trajectory, powerbot_drive(ROBOT), Floor(task.ground.friction), tracker=Tracker()
     )
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0

@@ -128,7 +128,7 @@ def test_planner_and_simulator_agree_on_the_wheel() -> None:
     wheel, robot = wheel_of(problem), STEP.robot()
     assert robot.wheels[0].radius == wheel.radius
     beyond = (robot.wheels[0].width - wheel.width) / 2  # rollers stand out of the hubs' faces
-    assert 0 <= beyond < problem.approach.gap / 3
+    assert 0 <= beyond < problem.climb.gap / 3
     places = [(w.l * math.cos(w.alpha), w.l * math.sin(w.alpha)) for w in problem.robot.wheels]
     assert np.array(robot.wheel_positions) == pytest.approx(np.array(places), abs=1e-12)
 

@@ -12,6 +12,7 @@ from trajopt.errors import ArgumentError, ProblemError
 from trajopt.objectives.clearance import ClearObjective
 from trajopt.objectives.terminal import TerminalObjective
 from trajopt.optimize.search import minimize
+from trajopt.pipeline import solve
 from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.climbing import Motion, collision_reach
 from trajopt.systems.smdw.entry import WHEELS, free_ground, step_of
@@ -80,7 +81,7 @@ def test_footprint_stays_on_free_ground(maneuver: Maneuver) -> None:
         assert y.min() >= ground.y[0]
         assert y.max() <= ground.y[1]
         assert min(plan.trajectory.margins().values()) >= -1e-9
-        assert 0 <= plan.room <= maneuver.problem.approach.gap + 1e-9
+        assert 0 <= plan.room <= maneuver.problem.climb.gap + 1e-9
 
 
 def test_rolling_on_from_the_target_meets_the_step_in_the_middle_of_the_window(
@@ -139,8 +140,8 @@ def test_a_step_turned_in_the_world_turns_the_plans() -> None:
     straight = load_problem(PROBLEMS / FILES[0])
     turned = straight.replace(
         {
-            "obstacle.direction": math.pi / 2,
-            "obstacle.place": [-0.76, 2.856],
+            "obstacles.step.direction": math.pi / 2,
+            "obstacles.step.place": [-0.76, 2.856],
             "space.x": [-1.5, 1.5],
             "space.y": [-0.6, 2.856],
             "start.pose": [0.0, 0.0, math.pi / 2],
@@ -212,14 +213,18 @@ def test_other_optimizers_plan_too() -> None:
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"obstacle.height": 0.06}, "at most Rc - Re = 5.10 cm"),
-        ({"obstacle.height": 0.0}, "obstacle.height"),
+        ({"obstacles.step.height": 0.06}, "at most Rc - Re = 5.10 cm"),
+        ({"obstacles.step.height": 0.0}, "obstacles[0].step.height"),
         ({"start.pose": [2.6, 0.0, 0.0]}, "before the step"),
         ({"start.pose": [0.0, 1.4, 0.0]}, "inside the space"),
         ({"ground.friction": 0.0}, "ground.friction"),
-        ({"limits.friction": 0.0}, "limits.friction"),
-        ({"obstacle.heigth": 0.05}, "nearest is 'height'"),
-        ({"robot.minor_radius": 0.2}, "robot.minor_radius"),
+        ({"obstacles.step.heigth": 0.05}, "nearest is 'height'"),
+        ({"obstacles.step.width": 4.0}, "across the whole space"),
+        ({"obstacles.step.name": "kerb"}, "of kind step: kerb"),
+        ({"climb.alphas": [1.2]}, "for this step"),
+        ({"robot.wheels.all.double.minor_radius": 0.2}, "robot.wheels[0].double.minor_radius"),
+        ({"robot.wheels.front-left.double.gap": 0.02}, "of equal sizes"),
+        ({"robot.name": "loc8"}, "four double wheels"),
     ],
 )
 def test_one_clear_message_each(changes: dict[str, object], text: str) -> None:
@@ -246,8 +251,21 @@ def test_without_a_turn_wheel_angles_cannot_be_chosen() -> None:
     assert "turn" in refused.reason
 
 
-def test_each_loader_says_what_the_other_is_for() -> None:
-    with pytest.raises(ProblemError, match="load_problem"):
-        load_problem(PROBLEMS / FILES[0])
-    with pytest.raises(ProblemError, match="loc8-smdw"):
-        load_problem(PROBLEMS / "scenario_1_lateral.toml")
+def test_chosen_angles_are_tried_either_way() -> None:
+    problem = load_problem(PROBLEMS / FILES[0], {"climb.alphas": [math.radians(40.0)]})
+    names = {c.name for c in configurations_of(problem)}
+    assert names == {"lateral left", "lateral right", "forward +40 deg", "forward -40 deg"}
+
+
+def test_solve_returns_the_best_plan_and_the_others_beside_it(maneuver: Maneuver) -> None:
+    solution = solve(maneuver.problem)
+    every = (solution, *solution.alternatives)
+    assert [s.duration for s in every] == pytest.approx([p.duration for p in maneuver.plans])
+    for found, plan in zip(every, maneuver.plans, strict=True):
+        assert found.holds, found.faults
+        assert found.problem.robot.name == "loc8-smdw"
+        assert found.problem.scene.obstacles == maneuver.problem.scene.obstacles
+        assert found.problem.critical == plan.configuration.critical
+    none = solve(maneuver.problem.replace({"space.y": [-0.5, 0.5]}))
+    assert none.trajectory is None
+    assert any("the space is too small" in fault for fault in none.faults)

@@ -228,7 +228,9 @@ def configurations(
     """
     reason = refusal(wheel, Motion.LEFT, 0.0, obstacle.height)
     if reason:
-        raise ArgumentError("obstacle.height", obstacle.height, f"a lower step: {reason}")
+        raise ArgumentError(
+            f"obstacles.{obstacle.name}.height", obstacle.height, f"a lower step: {reason}"
+        )
     span = forward_alphas(wheel, obstacle.height)
     inside: list[float] = []
     if span is not None:
