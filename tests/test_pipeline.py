@@ -136,7 +136,7 @@ def test_a_seed_below_zero_is_refused(scenario):
 def test_missing_engine_is_named(scenario, monkeypatch):
     monkeypatch.setitem(sys.modules, "pybullet", None)
     with pytest.raises(MissingDependencyError, match=r"trajopt\[simulate\]"):
-        validate(solve(scenario).trajectory, scenario)
+        validate(solve(scenario).trajectory, scenario, engine="pybullet")
 
 
 def test_import_is_light_and_lazy():

@@ -24,11 +24,14 @@ from trajopt.paths.path import Path
 from trajopt.problem import Problem
 from trajopt.problem.extensions import SECTIONS, entry
 from trajopt.refine.profile import follow
-from trajopt.simulate.check import ValidationReport, drive_trajectory
+from trajopt.simulate.check import ValidationReport
+from trajopt.simulate.check import validate as check
+from trajopt.simulate.engine import Engine
 from trajopt.timing.nominal import nominal_timing
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.crossing import Standing, crossings
+from trajopt.world.scene import Scene
 
 SearchObjective = TerminalObjective | DurationObjective | ClearObjective
 MARGIN = -1e-9  # least relative margin of a trajectory that keeps its limits
@@ -325,27 +328,39 @@ def _timed(
 
 def validate(
     trajectory: Trajectory,
-    problem: Problem,
+    where: Scene | Problem,
     *,
-    engine: str = "pybullet",
+    engine: str | Engine = "auto",
     picture: bool = False,
     control: Mode | None = None,
     seed: int = 0,
 ) -> ValidationReport:
-    """Drive a trajectory in a physics engine with real rollers, and measure how far it gets.
+    """Drive the trajectory's robot in a physics engine, and measure how far it gets and what it
+    touches.
 
-    ``engine``: "pybullet" or "mujoco". ``control``: None drives the planned wheel speeds; "wheel
-    servo", "pose" or "pose and phase" switch on a servo on the planned wheel angles, feedback of
-    the pose, of the pose and the critical wheel angles, with a pose measured with noise drawn from
-    ``seed``. Raises MissingDependencyError where the engine is not installed and SimulationError
-    where the simulation leaves physics.
+    ``where``: the scene to drive in, or the problem that was solved, which also says which wheel
+    angles count at the end. ``engine``: "mujoco", "pybullet", or "auto" for what is installed.
+    ``control``: None drives the planned wheel speeds; "wheel servo", "pose" or "pose and phase"
+    switch on a servo on the planned wheel angles, feedback of the pose, of the pose and the
+    critical wheel angles, with a pose measured with noise drawn from ``seed``. Raises
+    ArgumentError for what cannot be driven there, MissingDependencyError where the engine is not
+    installed and SimulationError where the simulation leaves physics.
     """
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError(
             "trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory has one)"
         )
-    if not isinstance(problem, Problem):
-        raise ArgumentError("problem", type(problem).__name__, "the Problem that was solved")
-    return drive_trajectory(
-        trajectory, problem, engine=engine, picture=picture, control=control, seed=seed
+    if not isinstance(where, Scene | Problem):
+        raise ArgumentError(
+            "where", type(where).__name__, "a Scene, or the Problem that was solved"
+        )
+    task = where if isinstance(where, Problem) else None
+    return check(
+        trajectory,
+        where if isinstance(where, Scene) else where.scene,
+        engine=engine,
+        picture=picture,
+        control=control,
+        critical=() if task is None else task.critical_indices,
+        seed=seed,
     )

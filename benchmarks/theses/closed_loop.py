@@ -20,9 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
-from trajopt.control.approach import Mode, Sensors, approach_controller
+from trajopt.control.approach import Mode, approach_controller
 from trajopt.problem import load_problem
 from trajopt.report.intervals import wilson
+from trajopt.simulate.sensors import Sensors
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
 from trajopt.systems.smdw.entry import free_ground
 from trajopt.systems.smdw.planner import Plan, configurations_of, plan_configuration
@@ -93,11 +94,11 @@ def trial(
         critical,
         cap=problem.limits.wheel_speed or math.inf,
         ground=free_ground(problem),
-        sensors=sensors,
         mode=mode,
-        rng=rng,
     )
-    recording = run_controlled(scene, controller, (x, y, yaw), four(initial), engine=engine)
+    recording = run_controlled(
+        scene, controller, sensors.sense(rng), (x, y, yaw), four(initial), engine=engine
+    )
     return (
         ending_of(recording, controller.goal),
         plan.duration,

@@ -40,6 +40,8 @@ from trajopt.timing.linear import linear_factor
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import lay_over
+from trajopt.world.scene import Scene
+from trajopt.world.terrain import Flat
 
 DATA = ROOT / "tests" / "data" / "powerbot"
 # balancing castors: one point of support behind
@@ -356,9 +358,7 @@ def visits(task: Problem) -> dict[str, tuple[Sensor, list[Visitor]]]:
 def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
     """Experiment 3 in pybullet, closed loop, its obstacles as solid discs; names of the
     pictures."""
-    from trajopt.systems.powerbot.differential import Floor
     from trajopt.systems.powerbot.drive_encounter import drive_encounter
-    from trajopt.systems.powerbot.model import powerbot_drive
     from trajopt.systems.powerbot.pictures import draw_replan
 
     FIGURES.mkdir(parents=True, exist_ok=True)
@@ -370,10 +370,10 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
         free = run_encounter(where, sensor, lambda *_: [], longest=200.0)
         seen = drive_encounter(
             where,
-            powerbot_drive(robot),
-            Floor(task.friction),
+            robot,
+            Scene(task.friction, Flat()),
             sensor,
-            visited_world(visitors, where.outline),
+            visitors,
             longest=300.0,
             start_error=START_ERROR,
         )
@@ -482,8 +482,7 @@ def following() -> ResultTable:
 
 def following_in_physics() -> ResultTable:
     """Experiment 6 in pybullet along its profile."""
-    from trajopt.systems.powerbot.differential import Floor, drive_in_pybullet
-    from trajopt.systems.powerbot.model import powerbot_drive
+    from trajopt.systems.powerbot.drive import drive_plan
 
     task, robot = problem(6), BALANCED
     profile = task.speed_profile()
@@ -498,12 +497,12 @@ def following_in_physics() -> ResultTable:
             manner="below" if manner == "below" else "least_squares",
         )
         for loop, tracker in (("open", None), ("closed", Tracker())):
-            seen = drive_in_pybullet(
-                plan.trajectory, powerbot_drive(robot), Floor(task.friction), tracker=tracker
-            )
-            moving = seen.times <= plan.trajectory.duration
-            along = np.hypot(*(seen.pose - seen.pose[0])[:, :2].T)
-            off = (seen.speed - np.interp(along, profile.places, profile.speeds))[moving]
+            scene = Scene(task.friction, Flat())
+            seen = drive_plan(plan.trajectory, scene, tracker=tracker)
+            run = seen.recording
+            moving = run.times <= plan.trajectory.duration
+            along = np.hypot(*(run.pose - run.pose[0])[:, :2].T)
+            off = (run.speed - np.interp(along, profile.places, profile.speeds))[moving]
             rows.append(
                 [
                     manner,
@@ -536,8 +535,7 @@ def following_in_physics() -> ResultTable:
 
 def physics(numbers: Sequence[int]) -> ResultTable:
     """Open and closed loop in pybullet beside the measured columns."""
-    from trajopt.systems.powerbot.differential import Floor, drive_in_pybullet
-    from trajopt.systems.powerbot.model import powerbot_drive
+    from trajopt.systems.powerbot.drive import drive_plan
 
     robot = BALANCED
     with (DATA / "measured.csv").open(encoding="utf-8") as file:
@@ -548,10 +546,10 @@ def physics(numbers: Sequence[int]) -> ResultTable:
         plan = time_scale(
             task.path, with_friction(task, RESERVE), robot=robot, ground=task.scene.ground
         )
-        floor = Floor(task.friction, tuple(r.ramp for r in task.ramps))
+        scene = Scene(task.friction, task.terrain)
         theirs = [m for m in measured if int(m["experiment"]) == number]
         for loop, tracker in (("open", None), ("closed", Tracker())):
-            seen = drive_in_pybullet(plan, powerbot_drive(robot), floor, tracker=tracker)
+            seen = drive_plan(plan, scene, tracker=tracker)
             rows.append(
                 [
                     str(number),

@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 from rich.console import Console
@@ -22,12 +23,13 @@ from rich.table import Table
 
 from benchmarks.common import provenance
 from trajopt.report.files import markdown
-from trajopt.robots.robot import robot
-from trajopt.simulate.engine import ENGINES, Command, Recording, SimRobot, make_engine
-from trajopt.simulate.rollers import SHAPES, Shape
-from trajopt.simulate.scene import Scene
+from trajopt.robots import Robot, robot
+from trajopt.robots.description import Shape
+from trajopt.simulate.engine import ENGINES, Command, Recording
+from trajopt.simulate.stepping import drive
 from trajopt.simulate.straight import DIRECTIONS, deviation, straight_command
-from trajopt.systems.smdw.loc8_model import roller_robot
+from trajopt.world.scene import Scene
+from trajopt.world.terrain import Flat
 
 DISTANCE = 5.0  # m, [guzman2015] section 5.3
 SPEEDS = (1.0, 2.0, 3.0, 4.0, 5.0)  # km/h, [guzman2015] Table 5.1
@@ -37,6 +39,8 @@ WHEELS = ("Mecanum", "SMDW")
 # the accuracy asked of the SMDW in pybullet).
 GOOD = 0.03
 KMH = 1.0 / 3.6  # m/s
+FRICTION = 0.8  # chosen: that of the climbs
+SHAPES: tuple[Shape, ...] = get_args(Shape)
 
 
 @dataclass(frozen=True)
@@ -65,10 +69,10 @@ class Row:
     reason: str
 
 
-def build(wheel: str, shape: Shape) -> SimRobot:
+def machine(wheel: str, shape: Shape) -> Robot:
     """LOC8 on the wheels called ``wheel`` with rollers of ``shape``."""
     name = "loc8" if wheel == "Mecanum" else "loc8-smdw"
-    return roller_robot(robot(name, {"wheels.all.rollers.shape": shape}))
+    return robot(name, {"wheels.all.rollers.shape": shape})
 
 
 def cases(speeds: Sequence[float], engines: Sequence[str]) -> list[Case]:
@@ -80,12 +84,12 @@ def cases(speeds: Sequence[float], engines: Sequence[str]) -> list[Case]:
 
 def measure(case: Case) -> Row:
     """Drive one case and compare it with kinematics."""
-    robot = build(case.wheel, case.shape)
+    loc8 = machine(case.wheel, case.shape)
     direction = dict(DIRECTIONS)[case.direction]
-    command = straight_command(robot, direction, DISTANCE, case.speed * KMH)
-    run = make_engine(case.engine).run(robot, Scene(), command)
+    command = straight_command(loc8, direction, DISTANCE, case.speed * KMH)
+    run = drive(loc8, Scene(FRICTION, Flat()), command, engine=case.engine)
     off = deviation(run, direction, DISTANCE)
-    ripple, saturated = _effort(run, command, robot.torque_limit)
+    ripple, saturated = _effort(run, command, float(loc8.motor_array("torque")[0]))
     return Row(
         case, off.along, off.across, off.yaw, ripple, saturated, run.real_time_factor, run.reason
     )
@@ -167,7 +171,7 @@ def write(rows: Sequence[Row], conditions: str, folder: Path) -> None:
     lines = [
         "# Roller shapes in the simulators",
         "",
-        f"LOC8 over {DISTANCE:g} m, friction {Scene().friction:g}. Spheres are the package's default. Real-time "
+        f"LOC8 over {DISTANCE:g} m, friction {FRICTION:g}. Spheres are the package's default. Real-time "
         "factors are of wall time: other load lowers them. " + conditions,
         "",
     ]

@@ -25,7 +25,6 @@ from trajopt.report.intervals import wilson
 from trajopt.robots.robot import robot
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.systems.smdw.climb import Climb, Outcome, judge, record_climb
-from trajopt.systems.smdw.entry import step_of
 from trajopt.systems.smdw.planner import Configuration, configurations_of
 from trajopt.systems.smdw.trials import critical_wheels, four, step_scene
 
@@ -118,9 +117,10 @@ def printed_climb(
         * spin
     )
     pose = (float(row["xf_m"]), float(row["yf_m"]), float(row["psif_rad"]))
-    room = step_of(problem).place[0] - pose[0]
+    scene = step_scene(problem, problem.ground.friction)
+    room = scene.step.place[0] - pose[0]
     return Climb(
-        replace(step_scene(problem, problem.ground.friction), height=height),
+        replace(scene, step=replace(scene.step, height=height)),
         pose,
         four(wheels),
         configuration.direction,

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path as FilePath
 
 import numpy as np
 import pytest
 
+from trajopt.control.approach import Estimate, predict
 from trajopt.control.commands import (
     commands,
     compare_log,
@@ -15,7 +17,8 @@ from trajopt.control.commands import (
     export_commands,
     sample_time_study,
 )
-from trajopt.control.tracking import Disturbance, Tracker, track
+from trajopt.control.measured import Measured
+from trajopt.control.tracking import PERIOD, Tracker, TrackingController
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
@@ -100,35 +103,38 @@ def test_bad_logs_are_refused(plan: Trajectory, tmp_path: FilePath, text: str) -
         compare_log(plan, log)
 
 
+def tracked(
+    plan: Trajectory, tracker: Tracker, start: Sequence[float], drift: Sequence[float], noise: float
+) -> np.ndarray:
+    """(N, 3): errors of a robot that rolls without slip, in its own axes off by ``start``, whose
+    wheels turn by ``drift`` (relative) more than ordered, with white ``noise``."""
+    robot, rng = shipped("powerbot"), np.random.default_rng(3)
+    control = TrackingController(plan, tracker, robot)
+    pose = plan.at(0.0).pose[0] + start
+    wheels, errors = np.zeros(2), []
+    for k in range(round((plan.duration + tracker.settle) / PERIOD)):
+        t = k * PERIOD
+        order = control.step(t, Measured(wheels, wheels, pose=pose, deviations=np.zeros(3)))
+        turned = order.wheel_speeds * (1 + drift + noise * rng.standard_normal(2)) * PERIOD
+        wheels = wheels + turned
+        pose = predict(Estimate(pose, np.zeros((3, 3))), robot, turned).pose
+        errors.append(pose - plan.at(min(t + PERIOD, plan.duration)).pose[0])
+    return np.array(errors)
+
+
 def test_tracker_corrects_start_errors_and_drift(plan: Trajectory) -> None:
-    disturbance = Disturbance((-0.1, 0.1, 0.1), left=0.01, right=-0.01, noise=0.05)
-    runs = [
-        track(
-            plan,
-            tracker,
-            shipped("powerbot"),
-            sample_time=0.05,
-            disturbance=disturbance,
-            rng=np.random.default_rng(3),
-        )
-        for tracker in (None, Tracker())
-    ]
-    open_loop, closed = (run.errors[-1] for run in runs)
-    assert closed[0] < 0.02 < open_loop[0]
-    assert np.degrees(closed[1]) < 1.0
+    errors = tracked(plan, Tracker(), (-0.1, 0.1, 0.1), np.array([0.01, -0.01]), 0.05)
+    assert np.hypot(*errors[-1, :2]) < 0.03  # without feedback 0.4
+    assert abs(np.degrees(errors[-1, 2])) < 1.0
 
 
 def test_tracker_without_errors_changes_nothing(plan: Trajectory) -> None:
-    runs = [
-        track(
-            plan,
-            tracker,
-            shipped("powerbot"),
-            sample_time=0.02,
-            disturbance=Disturbance(),
-            rng=np.random.default_rng(0),
-        )
-        for tracker in (None, Tracker())
-    ]
-    assert runs[0].errors[:, 0].max() < 2e-3
-    assert runs[1].errors[:, 0].max() < 2e-3
+    errors = tracked(plan, Tracker(), np.zeros(3), np.zeros(2), 0.0)
+    assert np.hypot(*errors[:, :2].T).max() < 5e-3
+    assert np.hypot(*errors[-1, :2]) < 2e-3
+
+
+def test_tracking_is_refused_where_wheels_have_to_be_steered(plan: Trajectory) -> None:
+    for name in ("car", "loc8"):
+        with pytest.raises(ArgumentError, match="without steering"):
+            TrackingController(plan, Tracker(), shipped(name))

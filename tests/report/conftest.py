@@ -7,10 +7,11 @@ import pytest
 from smdw_problems import smdw_problem
 
 import trajopt
+from tests.recordings import made_up
 from trajopt.pipeline import Solution
 from trajopt.problem import Problem
 from trajopt.simulate.check import ValidationReport
-from trajopt.simulate.engine import Recording
+from trajopt.simulate.engine import Hit
 from trajopt.systems.smdw.thesis import through_drives
 
 
@@ -60,27 +61,27 @@ def drifted(exact: Solution) -> ValidationReport:
     times = np.linspace(0.0, trajectory.duration + 0.2, 300)
     plan = trajectory.at(np.minimum(times, trajectory.duration))
     pose = plan.pose + np.outer(times, [1e-3, 0.0, 0.0])
-    flat, four = np.zeros(len(times)), np.zeros((len(times), 4))
     picture = np.random.default_rng(0).integers(0, 255, (24, 32, 3), dtype=np.uint8)
-    recording = Recording(
-        "made-up",
-        "0.0",
+    recording = made_up(
         times,
-        pose,
-        flat,
-        flat,
-        flat,
-        plan.wheel_angles - 2e-3,
-        plan.wheel_speeds,
-        four,
-        four,
-        np.full(len(times), 4),
-        False,
-        "",
-        1.25,
-        3.5,
-        picture,
+        pose=pose,
+        wheel_angles=plan.wheel_angles - 2e-3,
+        wheel_speeds=plan.wheel_speeds,
+        picture=picture,
     )
     return ValidationReport(
-        "made-up", 2e-3, -1e-3, 5e-4, np.full(4, -2e-3), 1e-3, 4e-3, 3.0, 3.5, plan.pose, recording
+        "made-up",
+        2e-3,
+        -1e-3,
+        5e-4,
+        np.full(4, -2e-3),
+        1e-3,
+        4e-3,
+        3.0,
+        (Hit("door", 1.5, (2.0, 0.25), 3),),
+        trajectory.robot.wheel_names,
+        np.array([0.01, 0.02, 0.03, 0.04]),
+        3.5,
+        plan.pose,
+        recording,
     )

@@ -48,6 +48,8 @@ def test_a_solution_that_does_not_hold(
 
 def test_validation(drifted: ValidationReport) -> None:
     text = text_of(validation_table(drifted))
+    assert "0.040 m/s, wheel rear-right" in text
+    assert "door after 1.50 s at (2.000, 0.250) m" in text
     assert "made-up 0.0" in text
     assert "+2.00 mm (+0.07 %)" in text
     assert "-1.00 mm (-0.03 %)" in text

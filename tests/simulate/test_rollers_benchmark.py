@@ -8,9 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.theses.rollers import HEADER, SPEEDS, Case, Row, cases, measure, summary, write
+from benchmarks.theses.rollers import (
+    HEADER,
+    SHAPES,
+    SPEEDS,
+    Case,
+    Row,
+    cases,
+    measure,
+    summary,
+    write,
+)
 from trajopt.simulate.engine import ENGINES
-from trajopt.simulate.rollers import SHAPES
 
 
 def test_cases_cover_all_combinations_but_ellipsoids_in_bullet() -> None:
@@ -25,7 +34,7 @@ def test_a_measured_row_is_written_with_its_conditions(tmp_path: Path) -> None:
     assert abs(row.along) < 0.02
     assert abs(row.across) < 0.02
     assert 0.0 < row.ripple < 0.05
-    write([row], tmp_path)
+    write([row], "numpy 2", tmp_path)
     with (tmp_path / "rollers.csv").open(encoding="utf-8") as file:
         header, line = list(csv.reader(file))
     assert tuple(header[:-1]) == HEADER

@@ -27,7 +27,7 @@ def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(climb_study, "run_climb", watched)
     row = plan.run(case)
     step = seen[0].step
-    assert (step.height, step.friction, step.torque) == (
+    assert (step.height, step.friction, step.robot.motor_array("torque")[0]) == (
         case["obstacles.step.height"],
         case["friction"],
         case["torque"],

@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 
 from tests.sweeps.crashes import ROOT
 from trajopt.cli import app
-from trajopt.control.approach import Sensors
 from trajopt.errors import ArgumentError
 from trajopt.problem import Problem, load_problem
+from trajopt.simulate.sensors import Sensors
 from trajopt.systems.smdw.approach_run import Ending
 from trajopt.systems.smdw.entry import step_of
 from trajopt.systems.smdw.planner import (

@@ -76,7 +76,9 @@ def solve(
 
 def validate(
     folder: Annotated[Path, typer.Argument(help="folder written by solve --out")],
-    engine: Annotated[str, typer.Option(help="pybullet or mujoco")] = "pybullet",
+    engine: Annotated[
+        str, typer.Option(help="mujoco, pybullet, or auto: what is installed")
+    ] = "auto",
     control: ControlOption = "none",
     seed: Annotated[
         int, typer.Option(help="seed of the measured pose's noise, with --control")

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.random import Generator
 
 from trajopt.arrays import Array, fold
 from trajopt.control.bend import TAIL_STRETCH, Goal, Reference, eased, reference_of, resolved
+from trajopt.control.measured import Measured, Targets
 from trajopt.errors import ArgumentError
 from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
@@ -45,26 +45,10 @@ TOUCH_UP_AFTER = (
     0.1  # s at rest before the first correction on the spot (servo and filter have settled), chosen
 )
 TOUCH_UP_TIME = 0.3  # s of one such correction, chosen
+SETTLE = 1.2  # s after the reference's end in which corrections on the spot end, chosen
+LEAST_DEVIATION = 1e-6  # m or rad, of a measurement that says it is exact; chosen
 TOUCH_UPS = 2  # corrections on the spot at most, chosen
 LEAST_TOUCH_UP = 0.01  # rad at a wheel (1 mm), chosen: smaller corrections are left
-
-
-@dataclass(frozen=True)
-class Sensors:
-    """Pose measurement every ``period`` (s) with standard deviations ``position`` (m) and ``yaw``
-    (rad)."""
-
-    period: float = 0.05
-    position: float = 0.005
-    yaw: float = math.radians(0.5)
-
-    def __post_init__(self) -> None:
-        if not (self.period > 0 and self.position >= 0 and self.yaw >= 0):
-            raise ArgumentError(
-                "sensors",
-                (self.period, self.position, self.yaw),
-                "a period > 0 and deviations >= 0",
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +74,11 @@ def predict(estimate: Estimate, robot: Robot, turned: Array) -> Estimate:
     )
 
 
-def correct(estimate: Estimate, measured: Array, sensors: Sensors) -> Estimate:
-    """Estimate after a pose measurement (3,)."""
-    noise = np.diag(np.maximum([sensors.position, sensors.position, sensors.yaw], 1e-6) ** 2)
+def correct(estimate: Estimate, pose: Array, deviations: Array) -> Estimate:
+    """Estimate after a measured pose (3,) with standard ``deviations`` (3,), m, m, rad."""
+    noise = np.diag(np.maximum(deviations, LEAST_DEVIATION) ** 2)
     gain = estimate.covariance @ np.linalg.inv(estimate.covariance + noise)
-    error = measured - estimate.pose
+    error = pose - estimate.pose
     error[2] = fold(error[2])
     return Estimate(estimate.pose + gain @ error, (np.eye(3) - gain) @ estimate.covariance)
 
@@ -113,8 +97,7 @@ def _on_the_spot(goal: Goal, t: float) -> Reference:
 
 @dataclass
 class ApproachController:
-    """Wheel speeds from time and measurements; ``step`` is called at every control period. Lives
-    for one run.
+    """Wheel speeds from time and measurements; see ``measured.Controller``.
 
     Raises ArgumentError where the manoeuvre turns too little for its wheel phase to be corrected.
     """
@@ -123,11 +106,8 @@ class ApproachController:
     reference: Reference
     goal: Goal
     estimate: Estimate
-    sensors: Sensors
     mode: Mode
-    rng: Generator
     _last_wheels: Array | None = None
-    _next_measurement: float = 0.0
     _next_solve: float = field(default=RESOLVE_EVERY)
     _touch_ups: int = 0
 
@@ -143,17 +123,14 @@ class ApproachController:
                 "be corrected on the way (switch on feedback of the pose alone)",
             )
 
-    def step(self, t: float, pose: Array, wheels: Array) -> Array:
-        """Wheel speeds (W,) at ``t`` (s). ``pose`` (3,): the true one, which the sensor blurs;
-        ``wheels`` (W,), rad."""
+    def step(self, t: float, measured: Measured) -> Targets:
+        """Wheel speeds (W,) at ``t`` (s)."""
+        wheels = measured.wheel_angles
         if self._last_wheels is not None:
             self.estimate = predict(self.estimate, self.robot, wheels - self._last_wheels)
         self._last_wheels = wheels.copy()
-        if t >= self._next_measurement - 1e-9:
-            s = self.sensors
-            blur = self.rng.normal(0.0, 1.0, 3) * [s.position, s.position, s.yaw]
-            self.estimate = correct(self.estimate, pose + blur, s)
-            self._next_measurement += s.period
+        if measured.pose is not None:
+            self.estimate = correct(self.estimate, measured.pose, measured.deviations)
         if self.mode != "wheel servo" and t >= self._next_solve - 1e-9:
             self._next_solve += RESOLVE_EVERY
             left = self.reference.times[-1] - t
@@ -162,7 +139,7 @@ class ApproachController:
             elif left <= -TOUCH_UP_AFTER and self._touch_ups < TOUCH_UPS:
                 self._touch_up(t, wheels)
         angle, speed = self.reference.wheels_at(t)
-        return np.asarray(speed + SERVO_GAIN * (angle - wheels))
+        return Targets(np.asarray(speed + SERVO_GAIN * (angle - wheels)))
 
     def _resolve(self, t: float, wheels: Array) -> None:
         """Bend what remains of the path."""
@@ -207,9 +184,7 @@ def approach_controller(
     cap: float,
     goal_wheels: Array | None = None,
     ground: FreeGround | None = None,
-    sensors: Sensors | None = None,
     mode: Mode = "pose and phase",
-    rng: Generator,
 ) -> ApproachController:
     """Controller for a planned trajectory that starts with measured wheel angles ``wheels`` (W,),
     rad.
@@ -228,6 +203,4 @@ def approach_controller(
     wanted = reference.wheels[-1] if goal_wheels is None else goal_wheels
     goal = Goal(reference.pose[-1], wanted, critical, cap, ground)
     start = Estimate(reference.pose[0], np.diag(START_SD) ** 2)
-    return ApproachController(
-        robot, reference, goal, start, Sensors() if sensors is None else sensors, mode, rng
-    )
+    return ApproachController(robot, reference, goal, start, mode)

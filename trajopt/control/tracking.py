@@ -17,12 +17,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.random import Generator
 
 from trajopt.arrays import Array, fold, require_not_negative, require_positive
-from trajopt.control.commands import half_track
+from trajopt.control.approach import START_SD, Estimate, correct, predict
+from trajopt.control.measured import Measured, Targets
+from trajopt.errors import ArgumentError
 from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
+
+PERIOD = 0.01  # s between two commands, that of the engines' records
 
 
 @dataclass(frozen=True)
@@ -48,10 +51,10 @@ class Tracker:
             require_not_negative(f"tracker.{name}", getattr(self, name))
 
     def wheel_speeds(
-        self, reference: Array, speed: tuple[float, float], pose: Array, width: float
-    ) -> tuple[float, float]:
-        """Left and right wheel speed (m/s) at ``pose`` (3,) for the ``reference`` pose (3,) that
-        moves at ``speed`` (m/s, rad/s); ``width`` (m) between the wheels."""
+        self, reference: Array, speed: tuple[float, float], pose: Array, robot: Robot
+    ) -> Array:
+        """Wheel speeds (W,), rad/s, of ``robot`` at ``pose`` (3,) for the ``reference`` pose (3,)
+        that moves at ``speed`` (m/s, rad/s)."""
         dx, dy = reference[0] - pose[0], reference[1] - pose[1]
         cos, sin = np.cos(pose[2]), np.sin(pose[2])
         ex, ey = cos * dx + sin * dy, -sin * dx + cos * dy
@@ -62,92 +65,47 @@ class Tracker:
         )
         v = v_ref * np.cos(turn) + self.along * ex
         w = w_ref + self.stiffness * v_ref * float(np.sinc(turn / np.pi)) * ey + gain * turn
-        left, right = v - w * width / 2, v + w * width / 2
-        most = max(abs(left), abs(right))
-        scale = min(1.0, self.wheel_speed / most) if most > 0 else 1.0
-        return float(left * scale), float(right * scale)
+        speeds = robot.inverse @ np.array([v, 0.0, w])
+        rims = np.abs(speeds) * [wheel.radius for wheel in robot.wheels]
+        return np.asarray(speeds / max(1.0, float(rims.max()) / self.wheel_speed))
 
 
-@dataclass(frozen=True)
-class Disturbance:
-    """What separates the robot from the plan: ``start`` error (m, m, rad, in the body frame) and
-    wheels that turn by ``left`` and ``right`` (relative) more than commanded, with white ``noise``
-    (relative, each step)."""
+class TrackingController:
+    """A ``tracker`` along a trajectory; see ``measured.Controller``. Between measurements the pose
+    is that of odometry.
 
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    left: float = 0.0
-    right: float = 0.0
-    noise: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Tracked:
-    """A tracked run: ``times`` (N,), ``pose`` and ``reference`` (N, 3), wheel speeds ``left``,
-    ``right`` (N,)."""
-
-    times: Array
-    pose: Array
-    reference: Array
-    left: Array
-    right: Array
-
-    @property
-    def errors(self) -> Array:
-        """(N, 2): distance (m) and heading (rad) between robot and reference."""
-        d = self.pose - self.reference
-        return np.column_stack([np.hypot(d[:, 0], d[:, 1]), np.abs(fold(d[:, 2]))])
-
-
-def track(
-    trajectory: Trajectory,
-    tracker: Tracker | None,
-    robot: Robot,
-    *,
-    sample_time: float,
-    disturbance: Disturbance,
-    rng: Generator,
-) -> Tracked:
-    """Drive a kinematic robot along ``trajectory``: closed loop with a tracker, open loop without
-    (None).
-
-    The tracker knows the true pose every ``sample_time`` (s) and its wheel speeds are held in
-    between. Raises ArgumentError for a sample time that is not positive or a robot that is no
-    differential drive.
+    Raises ArgumentError for a robot that cannot turn on the spot by its wheel speeds alone.
     """
-    require_positive("sample_time", sample_time, "s")
-    width = 2 * half_track(robot)
-    steps = int(np.ceil((trajectory.duration + (tracker.settle if tracker else 0.0)) / sample_time))
-    times = sample_time * np.arange(steps + 1, dtype=np.float64)
-    state = trajectory.at(np.minimum(times, trajectory.duration))
-    middle = trajectory.at(np.minimum(times + sample_time / 2, trajectory.duration))
-    moving = times + sample_time / 2 <= trajectory.duration
-    pose = state.pose[0].copy()
-    cos, sin = np.cos(pose[2]), np.sin(pose[2])
-    dx, dy, turn = disturbance.start
-    pose += [cos * dx - sin * dy, sin * dx + cos * dy, turn]
-    poses, sent = [pose.copy()], []
-    for k in range(steps):
-        v, w = (float(middle.twist[k, 0]), float(middle.twist[k, 2])) if moving[k] else (0.0, 0.0)
-        orders = (
-            (v - w * width / 2, v + w * width / 2)
-            if tracker is None
-            else tracker.wheel_speeds(state.pose[k], (v, w), pose, width)
+
+    def __init__(self, trajectory: Trajectory, tracker: Tracker, robot: Robot) -> None:
+        require_turning(robot)
+        count = int(np.ceil(trajectory.duration / PERIOD)) + 1
+        self.times = np.minimum(PERIOD * np.arange(count), trajectory.duration)
+        self.reference = trajectory.at(self.times)
+        self.tracker, self.robot, self.duration = tracker, robot, trajectory.duration
+        self._estimate = Estimate(self.reference.pose[0], np.diag(START_SD) ** 2)
+        self._wheels: Array | None = None
+
+    def step(self, t: float, measured: Measured) -> Targets:
+        """Wheel speeds (W,) to be reached a period after ``t`` (s)."""
+        if self._wheels is not None:
+            turned = measured.wheel_angles - self._wheels
+            self._estimate = predict(self._estimate, self.robot, turned)
+        self._wheels = measured.wheel_angles.copy()
+        if measured.pose is not None:
+            self._estimate = correct(self._estimate, measured.pose, measured.deviations)
+        pose = np.array([np.interp(t, self.times, c) for c in self.reference.pose.T])
+        after, moving = t + PERIOD, t + PERIOD < self.duration
+        v, w = (
+            float(np.interp(after, self.times, self.reference.twist[:, k])) * moving for k in (0, 2)
         )
-        sent.append(orders)
-        real = np.array(orders) * (
-            1
-            + np.array([disturbance.left, disturbance.right])
-            + disturbance.noise * rng.standard_normal(2)
-        )
-        pose = _stepped(pose, real, width, sample_time)
-        poses.append(pose.copy())
-    given = np.array([*sent, (0.0, 0.0)])
-    return Tracked(times, np.array(poses), state.pose, given[:, 0], given[:, 1])
+        return Targets(self.tracker.wheel_speeds(pose, (v, w), self._estimate.pose, self.robot))
 
 
-def _stepped(pose: Array, wheels: Array, width: float, time: float) -> Array:
-    """Pose after ``time`` (s) at constant wheel speeds (left, right): an arc."""
-    v, turn = wheels.mean(), (wheels[1] - wheels[0]) / width * time
-    chord = v * time * np.sinc(turn / (2 * np.pi))
-    middle = pose[2] + turn / 2
-    return np.asarray(pose + np.array([chord * np.cos(middle), chord * np.sin(middle), turn]))
+def require_turning(robot: Robot) -> None:
+    """Raises ArgumentError unless the robot drives along its heading and turns, as a differential
+    drive does."""
+    if robot.admissible.shape[1] != 2 or np.abs(robot.admissible[1]).max() > 1e-9:
+        raise ArgumentError(
+            "robot", robot.name, "a robot that drives along its heading and turns, without steering"
+        )

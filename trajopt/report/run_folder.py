@@ -265,6 +265,11 @@ def validation_summary(report: ValidationReport, robot: Robot) -> dict[str, Any]
         ),
         "path_rms_m": report.path_rms,
         "path_max_m": report.path_max,
+        "contacts": [
+            {"name": hit.name, "time_s": hit.time, "place_m": list(hit.place)}
+            for hit in report.contacts
+        ],
+        "slip_m_s": dict(zip(report.wheels, report.slip.tolist(), strict=True)),
         "versions": versions(),
         "commit": commit(),
     }

@@ -79,6 +79,11 @@ def validation_table(report: ValidationReport, robot: Robot) -> Table:
     )
     for name, value in zip(robot.wheel_names, report.wheel_deviation, strict=True):
         table.add_row(f"wheel {name}", f"{1e3 * value:+.3f} mrad")
+    worst = int(report.slip.argmax())
+    table.add_row("most slip", f"{report.slip[worst]:.3f} m/s, wheel {report.wheels[worst]}")
+    for hit in report.contacts:
+        x, y = hit.place
+        table.add_row("contact", f"{hit.name} after {hit.time:.2f} s at ({x:.3f}, {y:.3f}) m")
     table.add_row("real-time factor", f"{report.real_time_factor:.2f}")
     return table
 

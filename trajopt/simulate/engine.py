@@ -1,117 +1,67 @@
-"""The contract that every physics engine fulfils.
+"""The contract that every physics engine fulfils, and the registry of engines.
 
-Robot frame: x forward, y left, z up, origin below the middle of the wheel centres, on the ground
-when the robot stands on flat ground. Wheel order: front-left, front-right, rear-left, rear-right.
+Wheel arrays are over ``robot.wheel_names`` (W) unless said otherwise; arrays over every wheel of
+the robot's file, castors and balls included, have A columns.
 """
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import math
-from collections.abc import Callable
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Protocol
+from types import MappingProxyType
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.arrays import Array, IntArray
-from trajopt.errors import ArgumentError
-from trajopt.robots.robot import STANDARD_GRAVITY, Robot
-from trajopt.simulate.rollers import RollerWheel, Vector
-from trajopt.simulate.scene import Scene, require
+from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.simulate.model import Model, Vector
+from trajopt.simulate.scene import Stage
 
-GRAVITY = STANDARD_GRAVITY
-ENGINES = ("pybullet", "mujoco")
-
-
-@dataclass(frozen=True)
-class SimRobot:
-    """A chassis box on four roller wheels, all that an engine needs to build it.
-
-    ``robot`` is what it was made from, ``chassis_mass`` [kg] without wheels, ``chassis_size``
-    (length, width, height) [m] of the box that collides with the terrain, ``chassis_clearance`` [m]
-    from the ground to its bottom, ``cog_height`` [m] of the chassis alone above the ground,
-    ``wheel_positions`` four (x, y) [m], ``wheels`` in the same order, ``torque_limit`` [N m] at
-    each wheel, ``chassis_inertia`` principal (xx, yy, zz) [kg m^2], by default that of the box.
-    """
-
-    name: str
-    robot: Robot
-    chassis_mass: float
-    chassis_size: Vector
-    chassis_clearance: float
-    cog_height: float
-    wheel_positions: tuple[tuple[float, float], ...]
-    wheels: tuple[RollerWheel, ...]
-    torque_limit: float
-    chassis_inertia: Vector | None = None
-
-    def __post_init__(self) -> None:
-        """Raise ArgumentError for a size, mass or torque that makes no robot."""
-        for name in ("chassis_mass", "cog_height", "torque_limit"):
-            require(name, getattr(self, name), low=0.0, expected="a positive number")
-        require(
-            "chassis_clearance",
-            self.chassis_clearance,
-            low=-1e-12,
-            expected="a height of at least 0 m",
-        )
-        for size in self.chassis_size:
-            require("chassis_size", size, low=0.0, expected="three positive lengths in m")
-        if len(self.wheels) != 4 or len(self.wheel_positions) != 4:
-            raise ArgumentError(
-                "wheels", len(self.wheels), "4 wheels and 4 wheel positions (FL, FR, RL, RR)"
-            )
-
-    @property
-    def inertia(self) -> Vector:
-        """Principal moments of the chassis [kg m^2]; a homogeneous box unless given."""
-        if self.chassis_inertia is not None:
-            return self.chassis_inertia
-        x, y, z = self.chassis_size
-        unit = self.chassis_mass / 12.0
-        return (unit * (y * y + z * z), unit * (x * x + z * z), unit * (x * x + y * y))
-
-    def wheel_centres(self) -> Array:
-        """Wheel centres (4, 3) in the robot frame [m]."""
-        return np.array(
-            [(x, y, w.radius) for (x, y), w in zip(self.wheel_positions, self.wheels, strict=True)]
-        )
-
-    def wheel_speeds(self, vx: float, vy: float, yaw_rate: float) -> Array:
-        """Wheel speeds (4,) [rad/s] that roll without slip at body speeds (m/s, m/s, rad/s)."""
-        speeds: Array = self.robot.inverse @ np.array([vx, vy, yaw_rate])
-        return speeds
+# A new engine is one file and one line here: name -> where its class is. "auto" takes the first
+# that is installed, for a picture the last, which draws without a graphics driver.
+ENGINES: Mapping[str, str] = MappingProxyType(
+    {
+        "mujoco": "trajopt.simulate.mujoco:MuJoCo",
+        "pybullet": "trajopt.simulate.pybullet:PyBullet",
+    }
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Command:
     """Wheel speeds over time, linear between samples, zero before and after.
 
-    ``times`` (N,) [s] from 0, rising; ``wheel_speeds`` (N, 4) [rad/s]; ``start_pose`` (x, y, yaw)
-    [m, m, rad]; ``start_wheel_angles`` (4,) [rad].
+    ``times`` (N,) s from 0, rising; ``wheel_speeds`` (N, W) rad/s; ``angles`` (N, S) rad of steered
+    wheels, then of driven axles (None: 0), held after the end. The robot starts at ``start_pose``
+    (x, y, yaw), with ``start_wheel_angles`` (W,) and castors at ``start_swivels`` (C,), rad; None:
+    0.
     """
 
     times: Array
     wheel_speeds: Array
+    angles: Array | None = None
     start_pose: Vector = (0.0, 0.0, 0.0)
-    start_wheel_angles: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    start_wheel_angles: Array | None = None
+    start_swivels: Array | None = None
 
     def __post_init__(self) -> None:
         """Raise ArgumentError for wrong shapes, times that do not rise from 0, or values not
         finite."""
-        times, speeds = np.asarray(self.times), np.asarray(self.wheel_speeds)
+        times = np.asarray(self.times)
         if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or not np.all(np.diff(times) > 0.0):
             raise ArgumentError("times", times, "at least two rising times in s, the first 0")
-        if speeds.shape != (len(times), 4):
-            raise ArgumentError("wheel_speeds", speeds.shape, f"shape ({len(times)}, 4), rad/s")
-        for name, values in (
-            ("times", times),
-            ("wheel_speeds", speeds),
-            ("start_pose", self.start_pose),
-            ("start_wheel_angles", self.start_wheel_angles),
-        ):
-            if not np.all(np.isfinite(values)):
+        for name in ("wheel_speeds", "angles"):
+            rows = getattr(self, name)
+            if rows is not None and (np.ndim(rows) != 2 or len(rows) != len(times)):
+                raise ArgumentError(name, np.shape(rows), f"shape ({len(times)}, drives)")
+        for name, values in vars(self).items():
+            if values is not None and not np.all(np.isfinite(values)):
                 raise ArgumentError(name, values, "finite numbers")
 
     @property
@@ -119,19 +69,31 @@ class Command:
         """Last time [s]."""
         return float(self.times[-1])
 
-    def at(self, moment: float) -> Array:
-        """Wheel speeds (4,) at ``moment`` [s]."""
-        if moment < 0.0 or moment > self.times[-1]:
-            return np.zeros(4)
-        right = int(
-            np.clip(np.searchsorted(self.times, moment, side="right"), 1, len(self.times) - 1)
+    def at(self, moments: Array, angles: int) -> tuple[Array, Array]:
+        """Wheel speeds (M, W) and ``angles`` angles (M, S) at ``moments`` (M,), s."""
+        rows = np.zeros((len(self.times), angles)) if self.angles is None else self.angles
+        inside = (moments >= 0.0) & (moments <= self.times[-1])
+        return _between(self, self.wheel_speeds, moments) * inside[:, None], _between(
+            self, rows, moments
         )
-        before, after = self.times[right - 1], self.times[right]
-        part = (moment - before) / (after - before)
-        speeds: Array = (1.0 - part) * self.wheel_speeds[right - 1] + part * self.wheel_speeds[
-            right
-        ]
-        return speeds
+
+
+def _between(command: Command, rows: Array, moments: Array) -> Array:
+    return (
+        np.array([np.interp(moments, command.times, column) for column in rows.T])
+        .reshape(rows.shape[1], len(moments))
+        .T
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where a session begins: origin of the robot frame (m), ``yaw``, and joint ``angles`` (rad) by
+    link."""
+
+    place: Vector
+    yaw: float
+    angles: Mapping[int, float]
 
 
 @dataclass(frozen=True)
@@ -151,34 +113,87 @@ class Camera:
 
 
 @dataclass(frozen=True, eq=False)
-class Observation:
-    """What the engine shows at one moment.
+class Contacts:
+    """n contacts that carry force: the robot's ``link`` and the stage's ``solid`` (-1: plane or
+    field) (n,), ``place`` (n, 3) m, ``normal`` (n, 3) towards the robot, ``force`` (n,) N along it,
+    ``depth`` (n,) m."""
 
-    ``position`` (3,) [m] and ``rotation`` (3, 3) of the robot frame, ``velocity`` (3,) [m/s],
-    ``wheel_angles`` (4,) counted on, ``wheel_speeds`` (4,) [rad/s], ``wheel_torques`` (4,) [N m],
-    ``contacts`` with the terrain, ``penetration`` [m] of the deepest one (positive is inside).
+    link: IntArray
+    solid: IntArray
+    place: Array
+    normal: Array
+    force: Array
+    depth: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Of k rigid bodies: ``place`` (k, 3) m of the frame, ``rotation`` (k, 3, 3), ``velocity``
+    (k, 3) m/s of the frame's origin, ``spin`` (k, 3) rad/s."""
+
+    place: Array
+    rotation: Array
+    velocity: Array
+    spin: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """The truth at one moment.
+
+    ``position`` (3,) m and ``rotation`` (3, 3) of the robot frame, ``velocity`` (3,) m/s, ``spin``
+    (3,) rad/s; ``wheel_angles`` counted on, ``wheel_speeds`` rad/s, ``wheel_torques`` N m (W,),
+    ``wheel_places`` (W, 3) m of the centres; ``angles`` (S,) of steered wheels and driven axles,
+    ``swivels`` (C,) rad; ``loads`` (A,) N on the wheels, ``slip`` (A,) m/s: speed of a wheel over
+    the ground in the directions in which it holds; ``contacts`` with the ground, the deepest one's
+    ``penetration`` (m), and ``hits``: names and places (x, y) of obstacles touched.
     """
 
     position: Array
     rotation: Array
     velocity: Array
+    spin: Array
     wheel_angles: Array
     wheel_speeds: Array
     wheel_torques: Array
+    wheel_places: Array
+    angles: Array
+    swivels: Array
+    loads: Array
+    slip: Array
     contacts: int
     penetration: float
+    hits: tuple[tuple[str, tuple[float, float]], ...]
+
+    @property
+    def pose(self) -> Array:
+        """(3,): x, y (m) and yaw (rad, in (-pi, pi])."""
+        yaw = math.atan2(self.rotation[1, 0], self.rotation[0, 0])
+        return np.array([self.position[0], self.position[1], yaw])
+
+
+@dataclass(frozen=True)
+class Hit:
+    """The obstacle called ``name`` was touched at ``place`` (x, y, m), first at ``time`` (s), in
+    ``records`` of the recording. Of a step the face counts, not the top."""
+
+    name: str
+    time: float
+    place: tuple[float, float]
+    records: int
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
     """What happened, from the start of the command (after settling).
 
-    ``times`` (N,) [s]; ``pose`` (N, 3) x, y [m] and yaw [rad], counted on; ``height`` [m],
-    ``roll``, ``pitch`` [rad] (N,) of the robot frame; ``wheel_angles`` [rad], counted on,
-    ``wheel_speeds`` [rad/s], ``wheel_torques`` [N m] and ``wheel_heights`` [m] of the wheel
-    centres, all (N, 4); ``contacts`` (N,). ``exploded`` with its ``reason`` when the run was
-    stopped because the numbers left physics. ``wall_time`` [s] of stepping, ``real_time_factor``
-    simulated over wall time [-], ``picture`` (H, W, 3) uint8 when asked.
+    ``times`` (N,) s; ``pose`` (N, 3) x, y (m) and yaw (rad), counted on; ``height`` (m), ``roll``,
+    ``pitch`` (rad) (N,) of the robot frame, its ``speed`` (N,) m/s along the heading;
+    ``wheel_angles`` rad, counted on, ``wheel_speeds`` rad/s, ``wheel_torques`` N m and
+    ``wheel_heights`` m of the wheel centres, all (N, W); ``angles`` (N, S), ``swivels`` (N, C) rad;
+    ``loads`` N and ``slip`` m/s (N, A); ``contacts`` (N,); ``hits`` of obstacles. ``exploded`` with
+    its ``reason`` when the run was stopped because the numbers left physics. ``wall_time`` s of
+    stepping, ``real_time_factor`` simulated over wall time, ``picture`` (H, W, 3) uint8 when asked.
     """
 
     engine: str
@@ -188,11 +203,17 @@ class Recording:
     height: Array
     roll: Array
     pitch: Array
+    speed: Array
     wheel_angles: Array
     wheel_speeds: Array
     wheel_torques: Array
     wheel_heights: Array
+    angles: Array
+    swivels: Array
+    loads: Array
+    slip: Array
     contacts: IntArray
+    hits: tuple[Hit, ...]
     exploded: bool
     reason: str
     wall_time: float
@@ -200,7 +221,43 @@ class Recording:
     picture: NDArray[np.uint8] | None = None
 
 
-Controller = Callable[[float, Observation], Array]
+class Session(Protocol):
+    """One running simulation of a model on a stage."""
+
+    @property
+    def model(self) -> Model: ...
+
+    @property
+    def stage(self) -> Stage: ...
+
+    def advance(self, wheel_speeds: Array, angles: Array) -> None:
+        """One time step towards wheel speeds (W,) rad/s and angles (S,) rad of
+        ``model.targets``."""
+        ...
+
+    def base(self) -> Motion:
+        """Of the robot frame (k = 1)."""
+        ...
+
+    def motion(self, links: tuple[int, ...]) -> Motion:
+        """Of links."""
+        ...
+
+    def joints(self, links: tuple[int, ...]) -> tuple[Array, Array, Array]:
+        """Angles, counted on, speeds and motor torques (k,) of the joints of links."""
+        ...
+
+    def contacts(self) -> Contacts:
+        """Contacts of the last step."""
+        ...
+
+    def move(self, name: str, place: tuple[float, float] | None) -> None:
+        """Put the middle of an obstacle at ``place`` (x, y, m); None: out of the world."""
+        ...
+
+    def render(self, camera: Camera) -> NDArray[np.uint8]:
+        """Picture (H, W, 3)."""
+        ...
 
 
 class Engine(Protocol):
@@ -211,48 +268,37 @@ class Engine(Protocol):
         """Name in the registry."""
         ...
 
-    def run(
-        self,
-        robot: SimRobot,
-        scene: Scene,
-        command: Command,
-        *,
-        settle: float = 0.2,
-        picture: Camera | None = None,
-        controller: Controller | None = None,
-    ) -> Recording:
-        """Drive ``robot`` through ``scene``; see ``drive`` for the arguments."""
+    @property
+    def step(self) -> float:
+        """Time step, s."""
+        ...
+
+    @property
+    def stride(self) -> int:
+        """Steps between two records and between two calls of a controller."""
+        ...
+
+    def open(
+        self, model: Model, stage: Stage, start: Start, picture: Camera | None
+    ) -> AbstractContextManager[Session]:
+        """A session at ``start``. Raises MissingDependencyError without the engine's package,
+        SimulationError or ArgumentError for what it cannot build."""
         ...
 
 
-class Session(Protocol):
-    """One running simulation, as ``drive`` steps it."""
-
-    def advance(self, wheel_speeds: Array) -> None:
-        """One time step with these wheel speed targets (4,) [rad/s]."""
-        ...
-
-    def observe(self) -> Observation:
-        """State now."""
-        ...
-
-    def render(self, camera: Camera) -> NDArray[np.uint8]:
-        """Picture (H, W, 3)."""
-        ...
-
-
-def make_engine(name: str) -> Engine:
-    """The engine called ``name`` (one of ENGINES) with its default options; its package loads on
-    first run.
-
-    Raises ArgumentError for an unknown name.
-    """
-    if name == "pybullet":
-        from trajopt.simulate.pybullet import PyBullet
-
-        return PyBullet()
-    if name == "mujoco":
-        from trajopt.simulate.mujoco import MuJoCo
-
-        return MuJoCo()
-    raise ArgumentError("engine", name, "one of " + ", ".join(ENGINES))
+def make_engine(engine: str | Engine, *, picture: bool = False) -> Engine:
+    """The engine called ``engine`` with its default options; "auto": one whose package is
+    installed, for a ``picture`` one that draws everywhere. Raises ArgumentError for an unknown
+    name."""
+    if not isinstance(engine, str):
+        return engine
+    if engine == "auto":
+        installed = [name for name in ENGINES if importlib.util.find_spec(name) is not None]
+        if not installed:
+            raise MissingDependencyError("mujoco", "simulate", "a check in physics")
+        engine = installed[-1 if picture else 0]
+    if engine not in ENGINES:
+        raise ArgumentError("engine", engine, "one of " + ", ".join(["auto", *ENGINES]))
+    module, _, name = ENGINES[engine].partition(":")
+    made: Any = getattr(importlib.import_module(module), name)()
+    return made  # type: ignore[no-any-return]

@@ -1,17 +1,17 @@
 """Bullet through pybullet, in a private client for each run.
 
-The robot is a URDF written for this run: base at the chassis' centre of gravity, one continuous
-joint a wheel, one a roller. Why the settings are what they are stands beside each option.
+The robot is a URDF written for this run. Why the settings are what they are stands beside each
+option.
 """
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 import os
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,29 +21,30 @@ from numpy.typing import NDArray
 
 from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
-from trajopt.simulate.engine import (
-    GRAVITY,
-    Camera,
-    Command,
-    Controller,
-    Observation,
-    Recording,
-    SimRobot,
-)
-from trajopt.simulate.scene import Scene, blocks
-from trajopt.simulate.stepping import Pace, drive
-from trajopt.simulate.urdf import robot_urdf
+from trajopt.robots.robot import STANDARD_GRAVITY
+from trajopt.simulate.engine import Camera, Contacts, Motion, Start
+from trajopt.simulate.model import Model, Shape, cross
+from trajopt.simulate.scene import Solid, Stage
+from trajopt.simulate.stepping import Pace
+from trajopt.simulate.urdf import model_urdf
+from trajopt.world.height_map import HeightMap
 
 # Joints that one Bullet multibody can report; with more, joint states silently read zero
 # (measured).
 MAX_JOINTS = 121
-# Collision filter groups (bits): the robot's parts meet the terrain and never each other.
-ROBOT_GROUP, TERRAIN_GROUP = 2, 1
+# Collision filters (group, mask; bits): the robot's parts meet the ground or what stands on it, and
+# never each other.
+WHEELS, GROUND, OUTLINE, OBSTACLES = (2, 1), (1, 2), (8, 4), (4, 8)
 # Bullet stops joints at 100 rad/s unless told otherwise; a roller of 9.5 mm turns at 124 rad/s in
 # lateral motion at 3 km/h [rad/s].
 MAX_JOINT_SPEED = 1e4
 # Rounded margin that Bullet adds around convex hulls of a URDF [m] (gUrdfDefaultCollisionMargin).
 HULL_MARGIN = 0.001
+MOST_POINTS = 250_000  # of a height field; Bullet copies them through Python, chosen
+# Tyres give way by this much under the robot's weight, m, and this share of critical damping,
+# chosen: contacts that are equally soft share the load as the limits assume
+TYRE_SAG, TYRE_DAMPING = 0.001, 0.8
+AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
 @dataclass(frozen=True)
@@ -77,49 +78,64 @@ class PyBullet:
         """Name in the registry."""
         return "pybullet"
 
-    def run(
-        self,
-        robot: SimRobot,
-        scene: Scene,
-        command: Command,
-        *,
-        settle: float = 0.2,
-        picture: Camera | None = None,
-        controller: Controller | None = None,
-    ) -> Recording:
-        """Drive ``robot`` through ``scene``; arguments and errors of ``stepping.drive``.
-
-        Also raises MissingDependencyError without pybullet, ArgumentError for a robot with too many
-        rollers for one Bullet multibody, SimulationError when Bullet cannot build the robot.
-        """
-        joints = 4 + sum(len(wheel.rollers) for wheel in robot.wheels)
-        if joints > MAX_JOINTS:
+    @contextmanager
+    def open(
+        self, model: Model, stage: Stage, start: Start, picture: Camera | None
+    ) -> Iterator[_Session]:
+        """See ``engine.Engine``; ArgumentError for a robot with too many rollers for one Bullet
+        multibody or too large a height field, SimulationError when Bullet cannot build it."""
+        if len(model.links) - 1 > MAX_JOINTS:
             raise ArgumentError(
                 "robot.wheels",
-                f"{joints} joints",
-                f"at most {MAX_JOINTS} wheels and rollers (beyond, Bullet reads zeros)",
+                f"{len(model.links) - 1} joints",
+                f"at most {MAX_JOINTS} wheels and rollers in pybullet (beyond, it reads zeros)",
             )
-        bullet = load_bullet()
-        version = importlib.metadata.version("pybullet")
-        client = bullet.connect(bullet.DIRECT)
-        if client < 0:
-            raise SimulationError("pybullet could not open another physics client in this process")
+        bullet = Client(load_bullet())
         try:
-            session = _session(
-                self, bullet, client, robot, scene, command, visible=picture is not None
+            bullet.setGravity(0.0, 0.0, -STANDARD_GRAVITY)
+            bullet.setPhysicsEngineParameter(
+                fixedTimeStep=self.step,
+                numSolverIterations=self.solver_iterations,
+                # the implicit cone makes rollers creep
+                enableConeFriction=int(not model.is_roller.any()),
+                contactBreakingThreshold=self.contact_breaking_threshold,
+                erp=self.contact_erp,
+                contactERP=self.contact_erp,
+                enableFileCaching=0,  # else a robot of the same file name comes back
+                deterministicOverlappingPairs=1,
             )
-            return drive(
-                session,
-                robot,
-                command,
-                Pace(self.step, self.stride),
-                label=(self.name, version),
-                settle=settle,
-                picture=picture,
-                controller=controller,
-            )
+            yield _Session(bullet, self, model, stage, start, visible=picture is not None)
         finally:
-            bullet.disconnect(client)
+            bullet.disconnect()
+
+
+# Functions of the module that compute and know no client.
+_PURE = (
+    "computeProjectionMatrixFOV",
+    "computeViewMatrixFromYawPitchRoll",
+    "getMatrixFromQuaternion",
+    "rotateVector",
+)
+
+
+class Client:
+    """One physics client: every call of the pybullet module, with its number added."""
+
+    def __init__(self, module: Any) -> None:
+        self._module, self._number = module, module.connect(module.DIRECT)
+        if self._number < 0:
+            raise SimulationError("pybullet could not open another physics client in this process")
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._module, name)
+        if not callable(found) or isinstance(found, type) or name in _PURE:
+            return found
+
+        def call(*arguments: Any, **options: Any) -> Any:
+            return found(*arguments, **options, physicsClientId=self._number)
+
+        self.__dict__[name] = call
+        return call
 
 
 def load_bullet() -> Any:
@@ -145,203 +161,272 @@ def load_bullet() -> Any:
     return pybullet
 
 
-@dataclass(frozen=True, eq=False)
-class _BulletSession:
+class _Session:
     """One client with the robot in it; fulfils ``engine.Session``."""
 
-    bullet: Any
-    client: int
-    body: int
-    wheel_joints: tuple[int, ...]
-    torque: float
-    gain: float
-    cog: Array
-    angle_offset: Array
+    def __init__(
+        self,
+        bullet: Client,
+        options: PyBullet,
+        model: Model,
+        stage: Stage,
+        start: Start,
+        *,
+        visible: bool,
+    ) -> None:
+        self.bullet, self.options, self.model, self.stage = bullet, options, model, stage
+        self.solids = self._build_stage(visible)
+        self.robot = self._load(start, visible)
+        # Bullet numbers joints as it walks the tree; -1 is the base
+        names = [
+            bullet.getJointInfo(self.robot, joint)[1].decode()
+            for joint in range(bullet.getNumJoints(self.robot))
+        ]
+        if len(names) != len(model.links) - 1:
+            raise SimulationError(
+                f"pybullet built {len(names)} joints, not those of the robot {model.name!r}"
+            )
+        self.joint = [-1, *(names.index(f"link_{i}") for i in range(1, len(model.links)))]
+        self.link = {joint: i for i, joint in enumerate(self.joint)}
+        self.offset = dict.fromkeys(range(len(model.links)), 0.0)
+        for link in range(len(model.links)):
+            self._surface(link)
+        for link, angle in start.angles.items():
+            # small angles keep their digits: whole turns are added when reading
+            bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
+            self.offset[link] = float(angle - fold(float(angle)))
+        links = model.links
+        spins = [s for s, driven in zip(model.spins, model.driven, strict=True) if driven]
+        self.driven = np.array(model.driven, dtype=bool)
+        self.spins, self.efforts = self._joints(spins), [links[s].joint.effort for s in spins]
+        steered = [t for t in model.targets if links[t].joint.drive == "position"]
+        self.steered, self.powers = self._joints(steered), [links[s].joint.effort for s in steered]
+        self.sprung = (*model.springs, *(t for t in model.targets if t not in steered))
 
-    def advance(self, wheel_speeds: Array) -> None:
-        """One time step with these wheel speed targets (4,) [rad/s]."""
-        self.bullet.setJointMotorControlArray(
-            self.body,
-            self.wheel_joints,
-            self.bullet.VELOCITY_CONTROL,
-            targetVelocities=wheel_speeds.tolist(),
-            forces=[self.torque] * 4,
-            velocityGains=[self.gain] * 4,
-            physicsClientId=self.client,
-        )
-        self.bullet.stepSimulation(physicsClientId=self.client)
+    def _joints(self, links: list[int]) -> list[int]:
+        return [self.joint[link] for link in links]
 
-    def observe(self) -> Observation:
-        """State now."""
-        where, attitude = self.bullet.getBasePositionAndOrientation(
-            self.body, physicsClientId=self.client
+    def _build_stage(self, visible: bool) -> dict[int, int]:
+        """The stage's bodies: number of the solid (-1: plane or field) by Bullet's number."""
+        bullet, found = self.bullet, {}
+        if self.stage.plane:
+            found[bullet.createMultiBody(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE))] = -1
+        if self.stage.field is not None:
+            found[self._field(self.stage.field)] = -1
+        for i, solid in enumerate(self.stage.solids):
+            found[self._solid(solid, visible)] = i
+        for body, i in found.items():
+            # Bullet multiplies friction: the robot carries it all
+            bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=0.0)
+            thing = i >= 0 and self.stage.solids[i].meets == "obstacles"
+            bullet.setCollisionFilterGroupMask(body, -1, *(OBSTACLES if thing else GROUND))
+        return found
+
+    def _field(self, field: HeightMap) -> int:
+        """The height field, turned by a quarter, since Bullet cuts cells along the other diagonal
+        than the map does. Data are Z[y, x].ravel() with "rows" counting x, and the wrong order
+        loads silently; Bullet puts the middle of its extent and of its heights at the body's
+        origin."""
+        bullet, (rows, columns) = self.bullet, field.heights.shape
+        if field.heights.size > MOST_POINTS:
+            raise ArgumentError(
+                "scene.ground", field.heights.shape,
+                f"at most {MOST_POINTS} points in pybullet; crop the map",
+            )  # fmt: skip
+        shape = bullet.createCollisionShape(
+            bullet.GEOM_HEIGHTFIELD,
+            meshScale=[field.spacing, field.spacing, 1.0],
+            heightfieldData=field.heights.T[::-1].ravel().tolist(),
+            numHeightfieldRows=rows,
+            numHeightfieldColumns=columns,
         )
-        linear, angular = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
+        if shape < 0:
+            raise SimulationError(
+                f"pybullet could not build a height field of {rows} x {columns} points"
+            )
+        middle = (
+            field.origin[0] + field.size[0] / 2,
+            field.origin[1] + field.size[1] / 2,
+            float(field.heights.min() + field.heights.max()) / 2,
+        )
+        quarter = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+        return int(bullet.createMultiBody(0.0, shape, -1, middle, quarter))
+
+    def _solid(self, solid: Solid, visible: bool) -> int:
+        bullet, at = self.bullet, solid.shape.pose
+        kind, sizes = _geometry(bullet, solid.shape)
+        shape, seen = bullet.createCollisionShape(kind, **sizes), -1
+        if visible and solid.shape.kind != "hull":
+            looks = {"length" if key == "height" else key: v for key, v in sizes.items()}
+            seen = bullet.createVisualShape(kind, rgbaColor=[0.75, 0.62, 0.42, 1.0], **looks)
+        w, x, y, z = at.quaternion
+        return int(bullet.createMultiBody(0.0, shape, seen, at.place, (x, y, z, w)))
+
+    def _load(self, start: Start, visible: bool) -> int:
+        bullet, half = self.bullet, start.yaw / 2.0
+        turn = (0.0, 0.0, math.sin(half), math.cos(half))
+        self.cog = np.array(self.model.links[0].cog)
+        arm = np.array(bullet.rotateVector(turn, self.cog.tolist()))
+        with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
+            path = Path(folder) / "robot.urdf"
+            text = model_urdf(self.model, Path(folder), margin=HULL_MARGIN, visible=visible)
+            path.write_text(text, encoding="utf-8")
+            try:
+                return int(
+                    bullet.loadURDF(
+                        str(path),
+                        basePosition=(np.array(start.place) + arm).tolist(),
+                        baseOrientation=turn,
+                        flags=bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER,
+                    )
+                )
+            except bullet.error as error:
+                raise SimulationError(
+                    f"pybullet could not build the robot {self.model.name!r}: {error}"
+                ) from error
+
+    def _surface(self, number: int) -> None:
+        """Contact, damping and motor of one link.
+
+        Joint speed or damping in the same call as friction makes Bullet drop the friction, so it
+        takes three calls.
+        """
+        bullet, robot, joint = self.bullet, self.robot, self.joint[number]
+        link = self.model.links[number]
+        bullet.changeDynamics(robot, joint, linearDamping=0.0, angularDamping=0.0)
+        bullet.changeDynamics(
+            robot, joint, jointDamping=link.joint.damping, maxJointVelocity=MAX_JOINT_SPEED
+        )
+        bullet.changeDynamics(
+            robot, joint,
+            lateralFriction=link.grip * self.stage.scene.friction, spinningFriction=0.0,
+            rollingFriction=0.0, restitution=0.0,
+        )  # fmt: skip
+        if number in self.model.feet and link.shapes:
+            load = self.model.mass / len(self.model.feet)
+            stiffness = load * STANDARD_GRAVITY / TYRE_SAG
+            damping = TYRE_DAMPING * 2.0 * math.sqrt(stiffness * load)
+            bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=damping)
+        meets = WHEELS if link.meets == "ground" else OUTLINE
+        bullet.setCollisionFilterGroupMask(robot, joint, *meets)
+        if joint >= 0:  # every joint is born with a motor that brakes it
+            bullet.setJointMotorControl2(robot, joint, bullet.VELOCITY_CONTROL, force=0.0)
+
+    def advance(self, wheel_speeds: Array, angles: Array) -> None:
+        """See ``engine.Session``."""
+        bullet, robot = self.bullet, self.robot
+        if self.spins:
+            bullet.setJointMotorControlArray(
+                robot, self.spins, bullet.VELOCITY_CONTROL,
+                targetVelocities=wheel_speeds[self.driven].tolist(), forces=self.efforts,
+                velocityGains=[self.options.wheel_gain] * len(self.spins),
+            )  # fmt: skip
+        count = len(self.steered)
+        if count:
+            bullet.setJointMotorControlArray(
+                robot, self.steered, bullet.POSITION_CONTROL,
+                targetPositions=angles[:count].tolist(), forces=self.powers,
+            )  # fmt: skip
+        if self.sprung:
+            joints = [self.model.links[k].joint for k in self.sprung]
+            rests = [j.rest for j in joints[: len(self.model.springs)]] + angles[count:].tolist()
+            now = self.joints(self.sprung)[0]
+            forces = [
+                min(max(j.stiffness * (rest - at), -j.effort), j.effort)
+                for j, rest, at in zip(joints, rests, now.tolist(), strict=True)
+            ]
+            bullet.setJointMotorControlArray(
+                robot, self._joints(list(self.sprung)), bullet.TORQUE_CONTROL, forces=forces
+            )
+        bullet.stepSimulation()
+
+    def base(self) -> Motion:
+        """See ``engine.Session``."""
+        where, attitude = self.bullet.getBasePositionAndOrientation(self.robot)
+        linear, angular = self.bullet.getBaseVelocity(self.robot)
         rotation = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
         arm = rotation @ self.cog
-        joints = self.bullet.getJointStates(
-            self.body, self.wheel_joints, physicsClientId=self.client
+        velocity = np.array(linear) - np.cross(angular, arm)
+        return Motion(
+            (np.array(where) - arm)[None], rotation[None], velocity[None], np.array(angular)[None]
         )
-        contacts = self.bullet.getContactPoints(bodyA=self.body, physicsClientId=self.client)
-        touching = [point[8] for point in contacts if point[9] > 0.0]  # those that carry a force
-        return Observation(
-            position=np.array(where) - arm,
-            rotation=rotation,
-            velocity=np.array(linear) - np.cross(angular, arm),
-            wheel_angles=np.array([joint[0] for joint in joints]) + self.angle_offset,
-            wheel_speeds=np.array([joint[1] for joint in joints]),
-            wheel_torques=np.array([joint[3] for joint in joints]),
-            contacts=len(touching),
-            penetration=max((-depth for depth in touching), default=0.0),
+
+    def motion(self, links: tuple[int, ...]) -> Motion:
+        """See ``engine.Session``."""
+        if 0 in links:
+            raise ArgumentError("links", links, "wheels and rollers; base() tells of the chassis")
+        found = [
+            self.bullet.getLinkState(
+                self.robot, self.joint[link], computeLinkVelocity=1, computeForwardKinematics=1
+            )
+            for link in links
+        ]
+        cog, place, velocity, spin = (
+            np.array([state[k] for state in found]).reshape(-1, 3) for k in (0, 4, 6, 7)
         )
+        turns = np.array([self.bullet.getMatrixFromQuaternion(state[5]) for state in found])
+        return Motion(place, turns.reshape(-1, 3, 3), velocity + cross(spin, place - cog), spin)
+
+    def joints(self, links: tuple[int, ...]) -> tuple[Array, Array, Array]:
+        """See ``engine.Session``."""
+        if not links:
+            return np.zeros(0), np.zeros(0), np.zeros(0)
+        found = self.bullet.getJointStates(self.robot, self._joints(list(links)))
+        turns = np.array([self.offset[link] for link in links])
+        angles, speeds, torques = (np.array([state[k] for state in found]) for k in (0, 1, 3))
+        return angles + turns, speeds, torques
+
+    def contacts(self) -> Contacts:
+        """See ``engine.Session``."""
+        found = [p for p in self.bullet.getContactPoints(bodyA=self.robot) if p[9] > 0.0]
+        if not found:
+            none, rows = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+            return Contacts(none, none, rows, rows, np.zeros(0), np.zeros(0))
+        return Contacts(
+            np.array([self.link[p[3]] for p in found]),
+            np.array([self.solids[p[2]] for p in found]),
+            np.array([p[5] for p in found]),
+            np.array([p[7] for p in found]),
+            np.array([p[9] for p in found]),
+            np.array([-p[8] for p in found]),
+        )
+
+    def move(self, name: str, place: tuple[float, float] | None) -> None:
+        """See ``engine.Session``."""
+        for body, i in self.solids.items():
+            solid = self.stage.solids[i]
+            if i < 0 or solid.name != name or solid.meets != "obstacles":
+                continue
+            at = solid.shape.pose
+            w, x, y, z = at.quaternion
+            to = AWAY if place is None else (*place, at.place[2])
+            self.bullet.resetBasePositionAndOrientation(body, to, (x, y, z, w))
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
         """Picture (H, W, 3) by Bullet's own software renderer."""
-        seen = self.observe().position
-        target = (
-            camera.target if camera.target is not None else (float(seen[0]), float(seen[1]), 0.08)
-        )
-        view = self.bullet.computeViewMatrixFromYawPitchRoll(
+        bullet, seen = self.bullet, self.base().place[0]
+        target = camera.target or (float(seen[0]), float(seen[1]), float(seen[2]) + 0.08)
+        view = bullet.computeViewMatrixFromYawPitchRoll(
             target, camera.distance, math.degrees(camera.yaw), math.degrees(camera.pitch), 0.0, 2
         )
-        lens = self.bullet.computeProjectionMatrixFOV(
-            45.0, camera.width / camera.height, 0.05, 20.0
-        )
-        shot = self.bullet.getCameraImage(
-            camera.width,
-            camera.height,
-            view,
-            lens,
-            lightDirection=(1.0, -1.5, 3.0),
-            shadow=1,
-            renderer=self.bullet.ER_TINY_RENDERER,
-            physicsClientId=self.client,
-        )
+        lens = bullet.computeProjectionMatrixFOV(45.0, camera.width / camera.height, 0.05, 20.0)
+        shot = bullet.getCameraImage(
+            camera.width, camera.height, view, lens,
+            lightDirection=(1.0, -1.5, 3.0), shadow=1, renderer=bullet.ER_TINY_RENDERER,
+        )  # fmt: skip
         image: NDArray[np.uint8] = np.array(shot[2], dtype=np.uint8).reshape(
             camera.height, camera.width, 4
         )
         return image[:, :, :3].copy()
 
 
-def _session(
-    options: PyBullet,
-    bullet: Any,
-    client: int,
-    robot: SimRobot,
-    scene: Scene,
-    command: Command,
-    *,
-    visible: bool,
-) -> _BulletSession:
-    bullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
-    bullet.setPhysicsEngineParameter(
-        fixedTimeStep=options.step,
-        numSolverIterations=options.solver_iterations,
-        enableConeFriction=0,  # the implicit cone makes rollers creep
-        contactBreakingThreshold=options.contact_breaking_threshold,
-        erp=options.contact_erp,
-        contactERP=options.contact_erp,
-        enableFileCaching=0,  # else a robot of the same file name comes back
-        deterministicOverlappingPairs=1,
-        physicsClientId=client,
-    )
-    for ground in _terrain(bullet, client, scene, visible=visible):
-        _surface(
-            bullet, client, ground, -1, friction=1.0
-        )  # Bullet multiplies: the rollers carry it all
-        bullet.setCollisionFilterGroupMask(
-            ground, -1, TERRAIN_GROUP, ROBOT_GROUP, physicsClientId=client
-        )
-    body = _load(bullet, client, robot, command, visible=visible)
-    count = bullet.getNumJoints(body, physicsClientId=client)
-    names = [
-        bullet.getJointInfo(body, joint, physicsClientId=client)[1].decode()
-        for joint in range(count)
-    ]
-    if count != 4 + sum(len(wheel.rollers) for wheel in robot.wheels):
-        raise SimulationError(
-            f"pybullet built {count} joints, not those of the robot {robot.name!r}"
-        )
-    for joint in range(-1, count):
-        _surface(bullet, client, body, joint, friction=scene.friction)
-        bullet.setCollisionFilterGroupMask(
-            body, joint, ROBOT_GROUP, TERRAIN_GROUP, physicsClientId=client
-        )
-    rollers = [joint for joint, name in enumerate(names) if "roller" in name]
-    # every joint is born with a motor that brakes it
-    bullet.setJointMotorControlArray(
-        body, rollers, bullet.VELOCITY_CONTROL, forces=[0.0] * len(rollers), physicsClientId=client
-    )
-    wheels = tuple(names.index(f"wheel_{index}") for index in range(4))
-    start = np.array(command.start_wheel_angles, dtype=np.float64)
-    folded = fold(start)
-    for joint, angle in zip(wheels, folded, strict=True):
-        bullet.resetJointState(body, joint, float(angle), 0.0, physicsClientId=client)
-    cog = np.array([0.0, 0.0, robot.cog_height])
-    return _BulletSession(
-        bullet, client, body, wheels, robot.torque_limit, options.wheel_gain, cog, start - folded
-    )
-
-
-def _terrain(bullet: Any, client: int, scene: Scene, *, visible: bool) -> Iterator[int]:
-    plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
-    yield bullet.createMultiBody(0.0, plane, physicsClientId=client)
-    for block in blocks(scene.terrain):
-        half = [extent / 2.0 for extent in block.size]
-        shape = bullet.createCollisionShape(
-            bullet.GEOM_BOX, halfExtents=half, physicsClientId=client
-        )
-        colour = [0.75, 0.62, 0.42, 1.0]
-        seen = (
-            bullet.createVisualShape(
-                bullet.GEOM_BOX, halfExtents=half, rgbaColor=colour, physicsClientId=client
-            )
-            if visible
-            else -1
-        )
-        yield bullet.createMultiBody(
-            0.0, shape, seen, block.centre, block.quaternion(), physicsClientId=client
-        )
-
-
-def _load(bullet: Any, client: int, robot: SimRobot, command: Command, *, visible: bool) -> int:
-    x, y, yaw = command.start_pose
-    with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
-        path = Path(folder) / "robot.urdf"
-        path.write_text(
-            robot_urdf(robot, Path(folder), margin=HULL_MARGIN, visible=visible), encoding="utf-8"
-        )
-        try:
-            return int(
-                bullet.loadURDF(
-                    str(path),
-                    basePosition=(x, y, robot.cog_height),
-                    baseOrientation=bullet.getQuaternionFromEuler((0.0, 0.0, yaw)),
-                    flags=bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER,
-                    physicsClientId=client,
-                )
-            )
-        except bullet.error as error:
-            raise SimulationError(
-                f"pybullet could not build the robot {robot.name!r}: {error}"
-            ) from error
-
-
-def _surface(bullet: Any, client: int, body: int, link: int, *, friction: float) -> None:
-    """Contact and damping of one link, in three calls.
-
-    Joint speed or damping in the same call as friction makes Bullet drop the friction.
-    """
-    bullet.changeDynamics(body, link, linearDamping=0.0, angularDamping=0.0, physicsClientId=client)
-    bullet.changeDynamics(
-        body, link, jointDamping=0.0, maxJointVelocity=MAX_JOINT_SPEED, physicsClientId=client
-    )
-    bullet.changeDynamics(
-        body,
-        link,
-        lateralFriction=friction,
-        spinningFriction=0.0,
-        rollingFriction=0.0,
-        restitution=0.0,
-        physicsClientId=client,
-    )
+def _geometry(bullet: Client, shape: Shape) -> tuple[int, dict[str, Any]]:
+    """Kind and sizes of a solid as Bullet takes them."""
+    x, _, z = shape.size
+    sizes: dict[str, tuple[int, dict[str, Any]]] = {
+        "sphere": (bullet.GEOM_SPHERE, {"radius": x}),
+        "cylinder": (bullet.GEOM_CYLINDER, {"radius": x, "height": 2.0 * z}),
+        "box": (bullet.GEOM_BOX, {"halfExtents": list(shape.size)}),
+        "hull": (bullet.GEOM_MESH, {"vertices": [list(corner) for corner in shape.corners]}),
+    }
+    return sizes[shape.kind]

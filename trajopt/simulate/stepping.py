@@ -1,32 +1,46 @@
-"""The loop that drives any engine's session through a command and records it."""
+"""The loop that drives a robot through a scene in any engine and records it."""
 
 from __future__ import annotations
 
+import importlib.metadata
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.arrays import Array
+from trajopt.control.measured import Controller, Targets
 from trajopt.errors import ArgumentError
+from trajopt.robots.robot import Robot
+from trajopt.simulate.build import build
 from trajopt.simulate.engine import (
     Camera,
     Command,
-    Controller,
+    Engine,
+    Hit,
     Observation,
     Recording,
     Session,
-    SimRobot,
+    Start,
+    make_engine,
 )
+from trajopt.simulate.measure import observe
+from trajopt.simulate.model import Model, Vector
+from trajopt.simulate.scene import Stage, stage
+from trajopt.simulate.sensors import Sense, exact
+from trajopt.world.scene import Scene
 
-# A run has left physics beyond these (chosen: an order above anything a robot that drives at 5 km/h
-# and climbs 5 cm shows).
-MAX_SPEED = 10.0  # m/s of the robot frame
-MAX_HEIGHT = 1.0  # m of the robot frame above the ground
-MAX_PENETRATION = 0.02  # m of a roller into the terrain
-MAX_WHEEL_SPEED = 300.0  # rad/s
+SETTLE, SETTLE_ON_SPRINGS = 0.2, 0.5  # s at rest before the command starts, chosen
+# A run has left physics beyond these (chosen: an order above anything that a wheeled robot shows).
+MAX_SPEED = 20.0  # m/s of the robot frame
+MAX_HEIGHT = 1.0  # m of the robot frame above or below the ground
+MAX_PENETRATION = 0.02  # m of a wheel into the ground
+MAX_WHEEL_SPEED = 600.0  # rad/s
+MAX_LEAN = 1.2  # rad of roll or pitch beyond which a robot has tipped over, chosen
 
 
 @dataclass(frozen=True)
@@ -46,67 +60,179 @@ class Pace:
             raise ArgumentError("stride", self.stride, "at least 1 step a record")
 
 
-def drive(
-    session: Session,
-    robot: SimRobot,
-    command: Command,
-    pace: Pace,
+@contextmanager
+def open_session(
+    robot: Robot,
+    scene: Scene,
+    engine: Engine,
     *,
-    label: tuple[str, str],
-    settle: float,
-    picture: Camera | None,
-    controller: Controller | None,
-) -> Recording:
-    """Hold still for ``settle`` seconds, then execute the command and record every ``pace.stride``
-    steps.
-
-    Targets are taken in the middle of each step, so that the commanded angle is the integral of the
-    command. ``controller`` (time, observation) -> wheel speeds (4,) replaces the command's speeds
-    at every record. ``label`` is the engine's name and version. Raises ArgumentError for a bad
-    ``settle``.
-    """
+    pose: Vector = (0.0, 0.0, 0.0),
+    wheel_angles: Array | None = None,
+    angles: Array | None = None,
+    swivels: Array | None = None,
+    settle: float | None = None,
+    absent: Sequence[str] = (),
+    picture: Camera | None = None,
+) -> Iterator[Session]:
+    """The robot in the scene at ``pose``, at rest after ``settle`` seconds (None: as long as its
+    springs need); obstacles called ``absent`` are out of the world until moved. Raises ArgumentError for a bad ``settle`` or angles of another number, and what
+    ``Engine.open`` raises."""
+    stand = stage(scene)
+    model = build(robot, discs=stand.broken, outline=stand.has_obstacles)
+    if settle is None:
+        settle = SETTLE_ON_SPRINGS if model.springs else SETTLE
     if not (math.isfinite(settle) and settle >= 0.0):
         raise ArgumentError("settle", settle, "a time of at least 0 s")
-    begun = time.perf_counter()
-    still = np.zeros(4)
-    for _ in range(round(settle / pace.step)):
-        session.advance(still)
-    times, rows = [0.0], [session.observe()]
-    reason = explosion(rows[0])
+    joints: dict[int, float] = {}
+    for name, links, values in (
+        ("start_wheel_angles", model.spins, wheel_angles),
+        ("angles", model.targets, angles),
+        ("start_swivels", model.swivels, swivels),
+    ):
+        if values is not None and np.shape(values) != (len(links),):
+            raise ArgumentError(name, np.shape(values), f"shape ({len(links)},), rad")
+        joints |= dict(zip(links, np.zeros(len(links)) if values is None else values, strict=True))
+    start = Start(_standing(model, stand, pose), pose[2], joints)
+    with engine.open(model, stand, start, picture) as session:
+        for name in absent:
+            session.move(name, None)
+        held = Targets(np.zeros(len(model.spins)), np.array([joints[k] for k in model.targets]))
+        for _ in range(round(settle / engine.step)):
+            session.advance(held.wheel_speeds, held.angles)
+        yield session
+
+
+def _standing(model: Model, stand: Stage, pose: Vector) -> Vector:
+    """Place of the robot frame, as high as the highest ground near a wheel: it falls from there.
+    Raises ArgumentError where a wheel stands beyond a height map."""
+    x, y, yaw = pose
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    feet = np.array([model.frames[foot][0] for foot in model.feet])
+    around = np.array([(0.0, 0.0), (1, 0), (0, 1), (-1, 0), (0, -1)])[:, None, :]
+    near = (feet[:, :2] + around * feet[:, 2:] * float(stand.field is not None)).reshape(-1, 2)
+    turned = near @ np.array([[cos, sin], [-sin, cos]]) + np.array([x, y])
+    beyond = _beyond(stand, turned)
+    if beyond:
+        raise ArgumentError("start pose", pose, f"a start on the height map; {beyond}")
+    return (x, y, float(stand.height(turned).max()))
+
+
+def _beyond(stand: Stage, places: Array) -> str:
+    """Which of places (..., 2) no engine has ground for; empty when all have."""
+    if stand.field is None:
+        return ""
+    low = np.array(stand.field.origin)
+    off = np.any((places < low) | (places > low + np.array(stand.field.size)), axis=-1)
+    if not off.any():
+        return ""
+    x, y = places[off][0]
+    return f"a wheel is at ({x:.3g}, {y:.3g}) m; take a larger map"
+
+
+def interval(session: Session, before: Targets, after: Targets, steps: int) -> None:
+    """Targets go evenly from ``before`` to ``after`` in ``steps`` steps: a jump would tear wheels
+    loose. They are taken in the middle of each step, so that the commanded angle is the integral of
+    the command."""
+    share = ((np.arange(steps) + 0.5) / steps)[:, None]
+    still = np.zeros(len(session.model.targets))
+    first, last = (t.angles if np.size(t.angles) else still for t in (before, after))
+    speeds = before.wheel_speeds + share * (after.wheel_speeds - before.wheel_speeds)
+    rows = _within(session.model, speeds, first + share * (last - first))
+    for row in zip(*rows, strict=True):
+        session.advance(*row)
+
+
+def _within(model: Model, speeds: Array, angles: Array) -> tuple[Array, Array]:
+    """Wheel speeds (M, W) and angles (M, S) that motors and steering can do."""
+    top = np.array(model.top_speed)
+    low, high = np.array(model.target_reach).reshape(-1, 2).T
+    return np.clip(speeds, -top, top), np.clip(angles, low, high)
+
+
+def drive(
+    robot: Robot,
+    scene: Scene,
+    command: Command,
+    *,
+    engine: str | Engine = "auto",
+    controller: Controller | None = None,
+    sense: Sense = exact,
+    settle: float | None = None,
+    picture: Camera | None = None,
+) -> Recording:
+    """Hold still until settled, then execute the command, at most as fast as the motors turn, and
+    record every ``engine.stride`` steps.
+
+    A ``controller``, told what ``sense`` measures, replaces the command's speeds and angles at
+    every record. Raises ArgumentError for a command of another number of wheels or drives, and as
+    ``open_session``.
+    """
+    chosen = make_engine(engine, picture=picture is not None)
+    wheels = len(robot.wheels)
+    if np.shape(command.wheel_speeds)[1] != wheels:
+        raise ArgumentError(
+            "wheel_speeds", np.shape(command.wheel_speeds), f"{wheels} columns, one a wheel"
+        )
+    with open_session(
+        robot,
+        scene,
+        chosen,
+        pose=command.start_pose,
+        wheel_angles=command.start_wheel_angles,
+        angles=None if command.angles is None else command.angles[0],
+        swivels=command.start_swivels,
+        settle=settle,
+        picture=picture,
+    ) as session:
+        begun = time.perf_counter()
+        times, rows, reason = _driven(session, command, chosen, controller, sense)
+        wall = time.perf_counter() - begun
+        image = session.render(picture) if picture is not None else None
+    label = (chosen.name, importlib.metadata.version(chosen.name))
+    return _assembled(label, np.array(times), rows, reason, wall, image)
+
+
+def _driven(
+    session: Session, command: Command, pace: Engine, controller: Controller | None, sense: Sense
+) -> tuple[list[float], list[Observation], str]:
+    """Times, what was seen, and why the run was stopped (empty: it was not)."""
+    model = session.model
+    times, rows = [0.0], [observe(session)]
+    reason = explosion(rows[0], session.stage)
     steps = math.ceil(command.duration / pace.step - 1e-9)
-    targets = still
-    for index in range(steps):
+    middles = pace.step * (np.arange(-0.5, steps) if controller is None else np.zeros(1))
+    speeds, angles = _within(model, *command.at(middles, len(model.targets)))
+    last = Targets(np.zeros(len(model.spins)), angles[0])
+    for first in range(0, steps, pace.stride):
         if reason:
             break
-        moment = index * pace.step
+        span = min(pace.stride, steps - first)
         if controller is None:
-            targets = command.at(moment + 0.5 * pace.step)
-        elif index % pace.stride == 0:
-            targets = controller(moment, rows[-1])
-        session.advance(targets)
-        if (index + 1) % pace.stride == 0 or index + 1 == steps:
-            times.append((index + 1) * pace.step)
-            rows.append(session.observe())
-            reason = explosion(rows[-1])
-    wall = time.perf_counter() - begun
-    image = session.render(picture) if picture is not None else None
-    return _assembled(robot, label, np.array(times), rows, reason, (wall, settle), image)
+            for i in range(first + 1, first + span + 1):
+                session.advance(speeds[i], angles[i])
+        else:
+            asked = controller.step(times[-1], sense(times[-1], rows[-1]))
+            interval(session, last, asked, span)
+            last = asked
+        times.append((first + span) * pace.step)
+        rows.append(observe(session))
+        reason = explosion(rows[-1], session.stage)
+    return times, rows, reason
 
 
 def _assembled(
-    robot: SimRobot,
     label: tuple[str, str],
     times: Array,
     rows: list[Observation],
     reason: str,
-    clock: tuple[float, float],
+    wall: float,
     image: NDArray[np.uint8] | None,
 ) -> Recording:
-    """Recording from observations; ``clock`` is the wall time and the settling time [s]."""
-    rotation = np.array([row.rotation for row in rows])
-    position = np.array([row.position for row in rows])
+    def column(name: str) -> Array:
+        return np.array([getattr(row, name) for row in rows])
+
+    rotation, position, velocity = column("rotation"), column("position"), column("velocity")
     yaw = np.unwrap(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
-    centres = position[:, None, :] + np.einsum("nij,kj->nki", rotation, robot.wheel_centres())
     return Recording(
         engine=label[0],
         version=label[1],
@@ -115,32 +241,53 @@ def _assembled(
         height=position[:, 2],
         roll=np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]),
         pitch=-np.arcsin(np.clip(rotation[:, 2, 0], -1.0, 1.0)),
-        wheel_angles=np.array([row.wheel_angles for row in rows]),
-        wheel_speeds=np.array([row.wheel_speeds for row in rows]),
-        wheel_torques=np.array([row.wheel_torques for row in rows]),
-        wheel_heights=centres[:, :, 2],
-        contacts=np.array([row.contacts for row in rows], dtype=np.int64),
+        speed=np.einsum("ni,ni->n", velocity, rotation[:, :, 0]),
+        wheel_angles=column("wheel_angles"),
+        wheel_speeds=column("wheel_speeds"),
+        wheel_torques=column("wheel_torques"),
+        wheel_heights=column("wheel_places")[:, :, 2],
+        angles=column("angles"),
+        swivels=column("swivels"),
+        loads=column("loads"),
+        slip=column("slip"),
+        contacts=column("contacts").astype(np.int64),
+        hits=_collected(times, rows),
         exploded=bool(reason),
         reason=reason,
-        wall_time=clock[0],
-        real_time_factor=(clock[1] + float(times[-1])) / clock[0],
+        wall_time=wall,
+        real_time_factor=float(times[-1]) / wall,
         picture=image,
     )
 
 
-def explosion(seen: Observation) -> str:
-    """Why this state is not physics any more; empty when it is."""
+def _collected(times: Array, rows: list[Observation]) -> tuple[Hit, ...]:
+    """Each obstacle once, in the order of first contact."""
+    found: dict[str, Hit] = {}
+    for moment, row in zip(times, rows, strict=True):
+        for name, place in row.hits:
+            old = found.get(name, Hit(name, float(moment), place, 0))
+            found[name] = replace(old, records=old.records + 1)
+    return tuple(found.values())
+
+
+def explosion(seen: Observation, stand: Stage) -> str:
+    """Why this state is not physics any more, or no engine has ground for it; empty when it is."""
     numbers = (seen.position, seen.rotation, seen.velocity, seen.wheel_angles, seen.wheel_speeds)
     if not all(np.all(np.isfinite(values)) for values in numbers):
         return "the state is not finite"
     speed = float(np.linalg.norm(seen.velocity))
     if speed > MAX_SPEED:
         return f"the robot moves at {speed:.3g} m/s, more than {MAX_SPEED:g} m/s"
-    if abs(float(seen.position[2])) > MAX_HEIGHT:
-        return f"the robot is {float(seen.position[2]):.3g} m above the ground, more than {MAX_HEIGHT:g} m"
+    above = float(seen.position[2] - stand.height(seen.position[:2]))
+    if abs(above) > MAX_HEIGHT:
+        return f"the robot is {above:.3g} m above the ground, more than {MAX_HEIGHT:g} m"
     if seen.penetration > MAX_PENETRATION:
         return f"a contact is {seen.penetration:.3g} m deep, more than {MAX_PENETRATION:g} m"
-    fastest = float(np.max(np.abs(seen.wheel_speeds)))
+    fastest = float(np.max(np.abs(seen.wheel_speeds), initial=0.0))
     if fastest > MAX_WHEEL_SPEED:
         return f"a wheel turns at {fastest:.3g} rad/s, more than {MAX_WHEEL_SPEED:g} rad/s"
-    return ""
+    lean = math.acos(min(float(seen.rotation[2, 2]), 1.0))
+    if lean > MAX_LEAN:
+        return f"the robot tipped over at ({seen.position[0]:.3g}, {seen.position[1]:.3g}) m"
+    beyond = _beyond(stand, seen.wheel_places[:, :2])
+    return f"the robot left the height map: {beyond}" if beyond else ""

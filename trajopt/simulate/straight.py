@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trajopt.arrays import require_positive
 from trajopt.errors import ArgumentError
-from trajopt.simulate.engine import Command, Recording, SimRobot
-from trajopt.simulate.scene import require
+from trajopt.robots.robot import Robot
+from trajopt.simulate.engine import Command, Recording
 
 # Body directions of the three tests [rad] ([guzman2015], Figure 5.6; left in right-handed axes).
 DIRECTIONS: tuple[tuple[str, float], ...] = (
@@ -31,25 +32,29 @@ class Deviation:
 
 
 def straight_command(
-    robot: SimRobot, direction: float, distance: float, speed: float, *, ramp: float = 0.5
+    robot: Robot, direction: float, distance: float, speed: float, *, ramp: float = 0.5
 ) -> Command:
     """Wheel speeds that carry ``robot`` straight by ``distance`` [m] at ``speed`` [m/s].
 
     ``direction`` [rad] in the body, ``ramp`` [s] to full speed and to rest again (chosen: 1.7 m/s^2
     at 3 km/h, below what friction transmits). Raises ArgumentError for a distance, speed or ramp
-    that is not positive, and for a distance too short to reach full speed.
+    that is not positive, for a distance too short to reach full speed, and for a direction in which
+    the robot's wheels do not roll.
     """
     for name, value in (("distance", distance), ("speed", speed), ("ramp", ramp)):
-        require(name, value, low=0.0, expected="a positive number")
+        require_positive(name, value)
     if distance < speed * ramp:
         raise ArgumentError("distance", distance, f"at least speed * ramp = {speed * ramp:.3g} m")
+    twist = speed * np.array([math.cos(direction), math.sin(direction), 0.0])
+    allowed = robot.admissible
+    if np.abs(twist - allowed @ allowed.T @ twist).max() > 1e-9 * speed:
+        raise ArgumentError("direction", direction, "one in which every wheel rolls")
     end = distance / speed + ramp
-    full = robot.wheel_speeds(speed * math.cos(direction), speed * math.sin(direction), 0.0)
     share = np.array([0.0, 1.0, 1.0, 0.0]) if end > 2.0 * ramp else np.array([0.0, 1.0, 0.0])
     times = (
         np.array([0.0, ramp, end - ramp, end]) if end > 2.0 * ramp else np.array([0.0, ramp, end])
     )
-    return Command(times, share[:, None] * full[None, :])
+    return Command(times, share[:, None] * (robot.inverse @ twist)[None, :])
 
 
 def deviation(recording: Recording, direction: float, distance: float) -> Deviation:

@@ -11,7 +11,7 @@ import pytest
 
 pytest.importorskip("pybullet")
 
-from trajopt.control.encounter import Visitor, course, visited_world
+from trajopt.control.encounter import Visitor, course
 from trajopt.control.replan import Sensor, replan
 from trajopt.control.tracking import Tracker
 from trajopt.limits.acceleration import Acceleration
@@ -23,12 +23,14 @@ from trajopt.paths.path import Path
 from trajopt.problem import Problem, load_problem
 from trajopt.refine.profile import follow
 from trajopt.robots.robot import robot as shipped
-from trajopt.systems.powerbot.differential import Floor, Wall, drive_in_pybullet
+from trajopt.systems.powerbot.drive import drive_plan, faster
 from trajopt.systems.powerbot.drive_encounter import DrivenEncounter, drive_encounter
-from trajopt.systems.powerbot.model import powerbot_drive
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.ramp import Ramp, lay_over
+from trajopt.world.obstacles import Wall
+from trajopt.world.ramp import Ramp, Ramps, lay_over
+from trajopt.world.scene import Scene
+from trajopt.world.terrain import Flat
 
 ROOT = FilePath(__file__).resolve().parents[3]
 # balancing castors: one point of support behind
@@ -37,6 +39,7 @@ BALANCED = {
     "wheels.castor-right.position": [-0.31, 0.0],
 }
 ROBOT = shipped("powerbot", BALANCED)
+FLOOR = Scene(0.332, Flat())
 MOTORS = (Speed(2.1), Acceleration(0.55, 7.8))
 
 
@@ -54,9 +57,11 @@ def test_weight_and_straight_motion() -> None:
     plan = time_scale(
         Path.through([[0, 0], [2, 0]]), [Speed(0.5), Acceleration(0.5, 0.5)], robot=ROBOT
     )
-    seen = drive_in_pybullet(plan, powerbot_drive(ROBOT), Floor(0.332))
-    assert seen.load[-1].sum() == pytest.approx(148 * 9.81, rel=0.01)
-    assert seen.load[-1, :2].sum() / seen.load[-1].sum() == pytest.approx(0.218 / 0.35, rel=0.02)
+    seen = drive_plan(plan, FLOOR)
+    assert seen.recording.loads[-1].sum() == pytest.approx(148 * 9.80665, rel=0.01)
+    assert seen.recording.loads[-1, :2].sum() / seen.recording.loads[-1].sum() == pytest.approx(
+        0.218 / 0.35, rel=0.02
+    )
     assert seen.goal_offset < 2e-3
     assert seen.slip_ratio < 0.005
 
@@ -67,8 +72,8 @@ def test_slip_within_and_beyond_the_limit(turn: Trajectory) -> None:
         / turn.path.length
     )
     assert share >= 0.3
-    within = drive_in_pybullet(turn, powerbot_drive(ROBOT), Floor(0.332))
-    beyond = drive_in_pybullet(turn, powerbot_drive(ROBOT), Floor(0.332), faster=math.sqrt(1.2))
+    within = drive_plan(turn, FLOOR)
+    beyond = drive_plan(faster(turn, math.sqrt(1.2)), FLOOR)
     assert within.slip_ratio < 0.02
     assert beyond.slip_ratio > 2 * within.slip_ratio
 
@@ -81,12 +86,11 @@ def test_tip_binds_with_grip_and_height() -> None:
     limits = [Speed(2.0), Acceleration(0.55, 7.8), Slip(1.2, per_wheel=True), Tip(reserve=0.03)]
     plan = time_scale(Path.through([[0, 0], [6, 0]]), limits, robot=tall)
     assert any(part.limit == "tip" for part in plan.active)
-    within = drive_in_pybullet(plan, powerbot_drive(tall), Floor(1.2))
-    beyond = drive_in_pybullet(
-        plan, powerbot_drive(tall), Floor(1.2), faster=math.sqrt(1.3 * 0.132 / (0.132 - 0.03))
-    )
-    assert np.abs(within.pitch).max() < math.radians(1.0)
-    assert np.abs(beyond.pitch).max() > math.radians(5.0)
+    within = drive_plan(plan, Scene(1.2, Flat()))
+    factor = math.sqrt(1.3 * 0.132 / (0.132 - 0.03))
+    beyond = drive_plan(faster(plan, factor), Scene(1.2, Flat()))
+    assert np.abs(within.recording.pitch).max() < math.radians(1.0)
+    assert np.abs(beyond.recording.pitch).max() > math.radians(5.0)
 
 
 def test_closed_loop_up_a_ramp() -> None:
@@ -98,8 +102,8 @@ def test_closed_loop_up_a_ramp() -> None:
     plan = time_scale(
         path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.7 * 0.332, per_wheel=True)], robot=ROBOT
     )
-    seen = drive_in_pybullet(plan, powerbot_drive(ROBOT), Floor(0.332, (ramp,)), tracker=Tracker())
-    assert np.degrees(-seen.pitch).max() == pytest.approx(6.0, abs=0.5)
+    seen = drive_plan(plan, Scene(0.332, Ramps((ramp,), grade=0.2)), tracker=Tracker())
+    assert np.degrees(-seen.recording.pitch).max() == pytest.approx(6.0, abs=0.5)
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0
     assert seen.slip_ratio < 0.02
@@ -109,18 +113,23 @@ def test_closed_loop_through_a_door() -> None:
     """A door 0.9 m wide; the robot is 0.68 m wide and starts 5 cm and 2 deg off."""
     path = Path.through([[0, 0], [5, 0]])
     plan = time_scale(path, [Speed(0.5), Acceleration(0.55, 1.5)], robot=ROBOT)
-    walls = (Wall((2.5, 0.45), (2.5, 2.0)), Wall((2.5, -0.45), (2.5, -2.0)))
-    off = (0.0, 0.05, math.radians(2.0))
-    seen = drive_in_pybullet(
-        plan, powerbot_drive(ROBOT), Floor(0.332, (), walls), tracker=Tracker(), start_error=off
+    walls = (
+        Wall("left", 0.5, (2.5, 0.45), (2.5, 2.0), 0.1),
+        Wall("right", 0.5, (2.5, -0.45), (2.5, -2.0), 0.1),
     )
-    assert not seen.touched
+    door = Scene(0.332, Flat(), walls)
+    off = (0.0, 0.05, math.radians(2.0))
+    seen = drive_plan(plan, door, tracker=Tracker(), start_error=off)
+    assert not seen.recording.hits
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0
-    crash = drive_in_pybullet(
-        plan, powerbot_drive(ROBOT), Floor(0.332, (), walls), start_error=(0.0, 0.3, 0.0)
-    )
-    assert crash.touched
+    crash = drive_plan(plan, door, start_error=(0.0, 0.3, 0.0))
+    (hit,) = crash.recording.hits
+    assert hit.name == "left"
+    # the front, 0.369 m ahead of the axle, meets the wall's near face
+    assert hit.place[0] == pytest.approx(2.45, abs=0.01)
+    reached = float(np.interp(hit.time, crash.recording.times, crash.recording.pose[:, 0]))
+    assert reached + 0.369 == pytest.approx(2.45, abs=0.02)
 
 
 def problem(number: int) -> Problem:
@@ -156,24 +165,23 @@ def test_a_disc_that_crosses_is_let_by() -> None:
     limits = [Speed(0.5), Acceleration(0.55, 1.5), Slip(0.8 * 0.332, per_wheel=True)]
     where = course(time_scale(path, limits, robot=ROBOT), ROBOT)
     visitor = Visitor(appears=1.0, stays=6.0, distance=1.6, aside=-1.6, speed=0.5)
-    drive = powerbot_drive(ROBOT)
     seen = drive_encounter(
         where,
-        drive,
-        Floor(0.332),
+        ROBOT,
+        FLOOR,
         Sensor(1.4, 0.1, 0.1, unseen_speed=0.5),
-        visited_world([visitor], where.outline),
+        [visitor],
         longest=20.0,
         start_error=(0.0, 0.02, math.radians(1.0)),
     )
     assert_safe_and_at_the_goal(seen)
     blind = drive_encounter(
         where,
-        drive,
-        Floor(0.332),
+        ROBOT,
+        FLOOR,
         Sensor(1.4, 0.1, 0.1),
         longest=5.0,
-        world=visited_world([visitor], where.outline),
+        visitors=[visitor],
         planner=lambda w, s, plan, now, _: replan(w, s, plan, now, []),
     )
     assert blind.contact
@@ -207,10 +215,10 @@ def test_experiment_3_among_its_obstacles(kind: str) -> None:
     }[kind]
     seen = drive_encounter(
         where,
-        powerbot_drive(ROBOT),
-        Floor(task.ground.friction),
+        ROBOT,
+        Scene(task.ground.friction, Flat()),
         sensor,
-        visited_world(visitors, where.outline),
+        visitors,
         longest=200.0,
         start_error=(0.0, 0.02, math.radians(1.0)),
     )
@@ -229,9 +237,7 @@ def test_experiment_6_along_its_profile(manner: Literal["below", "least_squares"
     plan = follow(
         task.path, task.profile.bound, with_friction(task, 0.7), robot=ROBOT, manner=manner
     )
-    seen = drive_in_pybullet(
-        plan.trajectory, powerbot_drive(ROBOT), Floor(task.ground.friction), tracker=Tracker()
-    )
+    seen = drive_plan(plan.trajectory, Scene(task.ground.friction, Flat()), tracker=Tracker())
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0
     assert seen.speed_error < 0.043  # m/s, what [waheed2006] measured on the robot (Table 18)

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trajopt.control.approach import Estimate, Sensors, approach_controller, correct, predict
+from trajopt.control.approach import Estimate, approach_controller, correct, predict
 from trajopt.control.bend import ROOM, ROOM_WEIGHT, Goal, reference_of, resolved, wheel_path
+from trajopt.control.measured import Measured
 from trajopt.errors import ArgumentError
 from trajopt.paths.path import Path as RobotPath
 from trajopt.problem import load_problem
@@ -28,6 +29,12 @@ def plan() -> Plan:
     found = plan_configuration(problem, configurations_of(problem)[0])
     assert isinstance(found, Plan)
     return found
+
+
+def told(k: int, pose: np.ndarray, wheels: np.ndarray) -> Measured:
+    """Exact measurements; the pose at every fifth control period."""
+    none = np.zeros(3)
+    return Measured(wheels, 0.0 * wheels, none[:0], pose.copy() if k % 5 == 0 else None, none)
 
 
 def critical(plan: Plan) -> tuple[int, ...]:
@@ -79,7 +86,7 @@ def test_a_place_measured_later_corrects_the_yaw_to_the_right_side() -> None:
         estimate = predict(estimate, ROBOT, np.full(4, wheel))
     assert estimate.pose == pytest.approx([2.0, 0.0, 0.0], abs=1e-9)
     doubt = np.array([2.0, 0.1, 0.0])  # yaw as good as unmeasured
-    found = correct(estimate, doubt, Sensors(position=0.001, yaw=10.0))
+    found = correct(estimate, doubt, np.array([0.001, 0.001, 10.0]))
     assert found.pose[2] == pytest.approx(0.05, abs=0.01)
 
 
@@ -97,7 +104,7 @@ def test_measurements_shrink_the_error() -> None:
         measured[2] = (measured[2] + math.pi) % (
             2 * math.pi
         ) - math.pi  # a sensor's yaw jumps at half a turn
-        estimate = correct(estimate, measured, Sensors())
+        estimate = correct(estimate, measured, np.array([0.005, 0.005, math.radians(0.5)]))
     assert estimate.pose == pytest.approx(truth, abs=4e-3)
     assert np.sqrt(np.diag(estimate.covariance)).max() < 2e-3
 
@@ -137,19 +144,16 @@ def test_time_is_stretched_below_the_wheel_speed_cap(plan: Plan) -> None:
 def test_kinematic_closed_loop_removes_start_errors(plan: Plan) -> None:
     """A robot that rolls without slip, started off its place: with the controller pose and phase
     meet."""
-    rng = np.random.default_rng(2)
     control = approach_controller(
         plan.trajectory,
         ROBOT,
         np.zeros(4),
         critical(plan),
         cap=30.0,
-        sensors=Sensors(position=0.0, yaw=0.0),
-        rng=rng,
     )
     truth, wheels, dt = control.reference.pose[0] + [0.01, -0.01, 0.017], np.zeros(4), 0.01
     for k in range(round((plan.duration + 1.0) / dt)):
-        turned = control.step(k * dt, truth, wheels) * dt
+        turned = control.step(k * dt, told(k, truth, wheels)).wheel_speeds * dt
         truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, turned).pose
         wheels = wheels + turned
     assert truth == pytest.approx(control.goal.pose, abs=2e-3)
@@ -225,9 +229,7 @@ def test_an_error_at_rest_is_shared_between_pose_and_phase_on_the_spot(plan: Pla
             np.zeros(4),
             critical(plan),
             cap=30.0,
-            sensors=Sensors(position=0.0, yaw=0.0),
             mode=mode,
-            rng=np.random.default_rng(1),
         )
         truth, wheels, dt = (
             control.goal.pose + np.array([0.004, 0.0, 0.0]),
@@ -237,7 +239,7 @@ def test_an_error_at_rest_is_shared_between_pose_and_phase_on_the_spot(plan: Pla
         start = round(float(control.reference.times[-1]) / dt)
         control._next_solve = start * dt  # on the way nothing is corrected
         for k in range(start, start + 130):
-            turned = control.step(k * dt, truth, wheels) * dt
+            turned = control.step(k * dt, told(k, truth, wheels)).wheel_speeds * dt
             truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, turned).pose
             wheels = wheels + turned
         left[mode] = (
@@ -254,11 +256,5 @@ def test_too_little_turn_is_refused() -> None:
     path = RobotPath.through([[0, 0], [1, 0], [2, 0]], heading=[0.0, 0.1, 0.2])
     trajectory = time_scale(path, load_problem(FILE).limits, robot=ROBOT)
     with pytest.raises(ArgumentError, match="30 deg of turn"):
-        approach_controller(
-            trajectory, ROBOT, np.zeros(4), (0, 2), cap=30.0, rng=np.random.default_rng(0)
-        )
-    approach_controller(
-        trajectory, ROBOT, np.zeros(4), (0, 2), cap=30.0, mode="pose", rng=np.random.default_rng(0)
-    )
-    with pytest.raises(ArgumentError, match="sensors"):
-        Sensors(period=0.0)
+        approach_controller(trajectory, ROBOT, np.zeros(4), (0, 2), cap=30.0)
+    approach_controller(trajectory, ROBOT, np.zeros(4), (0, 2), cap=30.0, mode="pose")

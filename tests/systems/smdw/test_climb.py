@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.recordings import made_up
 from trajopt.errors import ArgumentError
 from trajopt.problem import load_problem
+from trajopt.robots import robot
+from trajopt.simulate.double import double_rollers
 from trajopt.simulate.engine import Recording
 from trajopt.systems.smdw.climb import (
     Climb,
@@ -21,15 +24,13 @@ from trajopt.systems.smdw.climb import (
     run_climb,
 )
 from trajopt.systems.smdw.entry import WHEELS
-from trajopt.systems.smdw.planner import (
-    Plan,
-    configurations_of,
-    plan_configuration,
-    wheel_of,
-)
+from trajopt.systems.smdw.planner import Plan, configurations_of, plan_configuration
+from trajopt.systems.smdw.trials import step_scene
+from trajopt.world.obstacles import Step
 
 FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"
-STEP = StepScene(0.05, (2.856, 0.76), 0.0, 0.8, 8.0, 0.047, 0.045, 0.03)
+EDGE = Step("step", 0.05, (2.856, 0.76), 0.0, width=8.0, depth=4.0)
+STEP = StepScene(EDGE, 0.8, robot("loc8-smdw"))
 CLIMB = Climb(STEP, (2.46, 0.76, -math.pi / 2), (0.0,) * 4, (0.0, 1.0), (0, 2), (0.02, 0.02))
 
 
@@ -38,24 +39,12 @@ def recording(rise: np.ndarray, turned: float, exploded: bool = False) -> Record
     ``turned``."""
     times = np.linspace(0, 2, 201)
     heights = 0.098 + np.where(times[:, None] > 1.0, rise, 0.0)
-    zero4, zero = np.zeros((201, 4)), np.zeros(201)
-    return Recording(
-        "none",
-        "0",
+    return made_up(
         times,
-        np.zeros((201, 3)),
-        zero,
-        zero,
-        zero,
-        np.outer(times / 2, np.full(4, turned)),
-        zero4,
-        zero4,
-        heights,
-        np.zeros(201, dtype=np.int64),
-        exploded,
-        "why" if exploded else "",
-        1.0,
-        1.0,
+        wheel_angles=np.outer(times / 2, np.full(4, turned)),
+        wheel_heights=heights,
+        exploded=exploded,
+        reason="why" if exploded else "",
     )
 
 
@@ -122,15 +111,22 @@ def test_exploded_runs_are_counted_and_left_out() -> None:
         rate([good], what="luck")
 
 
-def test_planner_and_simulator_agree_on_the_wheel() -> None:
-    """The robot that physics climbs with has the problem's sizes and wheel places."""
-    problem = load_problem(FILE)
-    wheel, robot = wheel_of(problem), STEP.robot()
-    assert robot.wheels[0].radius == wheel.radius
-    beyond = (robot.wheels[0].width - wheel.width) / 2  # rollers stand out of the hubs' faces
-    assert 0 <= beyond < problem.climb.gap / 3
-    places = [(w.l * math.cos(w.alpha), w.l * math.sin(w.alpha)) for w in problem.robot.wheels]
-    assert np.array(robot.wheel_positions) == pytest.approx(np.array(places), abs=1e-12)
+def test_planner_and_simulator_agree_on_the_robot() -> None:
+    """The robot that physics climbs with is the problem's, before the problem's step, and its
+    rollers stand out of the hubs' faces by little."""
+    problem = load_problem(FILE).replace({"robot.wheels.all.double.minor_radius": 0.05})
+    there = step_scene(problem, 0.8, torque=5.0)
+    assert there.scene().obstacles == problem.scene.obstacles
+    assert there.robot.motor_array("torque") == pytest.approx([5.0] * 4)
+    assert there.robot == problem.robot.replace({"motors.all.torque": 5.0})
+    section = there.robot.description.wheels[0]
+    assert section.double is not None
+    assert section.double.minor_radius == 0.05
+    reach = max(
+        abs(roller.centre[1]) + roller.length / 2 * abs(roller.axis[1]) + roller.radius
+        for roller in double_rollers(section, section.rollers, section.double)
+    )
+    assert 0 <= reach - section.width / 2 < 0.012
 
 
 def test_planned_lateral_climb_gets_up_and_a_wall_does_not() -> None:
@@ -152,6 +148,7 @@ def test_planned_lateral_climb_gets_up_and_a_wall_does_not() -> None:
     assert first.critical_up
     assert not first.exploded
     assert climb_all([climb]) == [first]  # the same bits again
-    wall = run_climb(replace(climb, step=replace(STEP, height=0.09)))
+    weak = STEP.robot.replace({"motors.all.torque": 1.0})
+    wall = run_climb(replace(climb, step=replace(STEP, step=replace(EDGE, height=0.09))))
     assert not any(wall.up)
-    assert not run_climb(replace(climb, step=replace(STEP, torque=1.0))).critical_up
+    assert not run_climb(replace(climb, step=replace(STEP, robot=weak))).critical_up

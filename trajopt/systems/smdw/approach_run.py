@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.arrays import Array, fold
-from trajopt.control.approach import ApproachController
+from trajopt.arrays import fold
+from trajopt.control.approach import SETTLE, ApproachController
 from trajopt.control.bend import Goal
-from trajopt.simulate.engine import Command, Controller, Observation, Recording
+from trajopt.simulate.engine import Command, Recording
+from trajopt.simulate.sensors import Sense
 from trajopt.systems.smdw.climb import StepScene, run_approach
-
-SETTLE = 1.2  # s after the reference's end until errors are taken, chosen: corrections on the spot end within it
 
 
 @dataclass(frozen=True)
@@ -37,34 +36,24 @@ class Ending:
         )
 
 
-def steered(controller: ApproachController) -> Controller:
-    """The controller as engines ask it: it sees pose and wheel angles, and blurs the pose
-    itself."""
-
-    def drive(t: float, seen: Observation) -> Array:
-        yaw = math.atan2(seen.rotation[1, 0], seen.rotation[0, 0])
-        return controller.step(
-            t, np.array([seen.position[0], seen.position[1], yaw]), seen.wheel_angles
-        )
-
-    return drive
-
-
 def run_controlled(
     step: StepScene,
     controller: ApproachController,
+    sense: Sense,
     start: tuple[float, float, float],
     wheels: tuple[float, float, float, float],
     *,
     engine: str = "mujoco",
 ) -> Recording:
-    """Drive the controller's approach from the true ``start`` (m, m, rad) and ``wheels`` (rad), the
+    """Drive the controller's approach, told what ``sense`` measures, from the true ``start`` (m, m, rad) and ``wheels`` (rad), the
     step standing there, until it has settled."""
     lasts = float(
         controller.reference.times[-1]
     )  # it may take the end of the path slower than the plan
-    command = Command(np.array([0.0, lasts]), np.zeros((2, 4)), start, wheels)
-    return run_approach(step, command, engine=engine, controller=steered(controller), rest=SETTLE)
+    command = Command(np.array([0.0, lasts]), np.zeros((2, 4)), None, start, np.array(wheels))
+    return run_approach(
+        step, command, engine=engine, controller=controller, sense=sense, rest=SETTLE
+    )
 
 
 def ending_of(recording: Recording, goal: Goal) -> Ending:

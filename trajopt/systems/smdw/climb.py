@@ -10,19 +10,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
 import numpy as np
 
+from trajopt.control.measured import Controller
 from trajopt.errors import ArgumentError
 from trajopt.report.intervals import wilson
-from trajopt.simulate.engine import Command, Controller, Recording, SimRobot, make_engine
-from trajopt.simulate.scene import Scene, Step
-from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, loc8_smdw
-from trajopt.systems.smdw.geometry import DoubleWheel
-from trajopt.systems.smdw.loc8_model import roller_robot
+from trajopt.robots.robot import Robot
+from trajopt.simulate.engine import Command, Recording
+from trajopt.simulate.sensors import Sense, exact
+from trajopt.simulate.stepping import drive
+from trajopt.world.obstacles import Step
+from trajopt.world.scene import Scene
+from trajopt.world.terrain import Flat
 
 Four = tuple[float, float, float, float]
 
@@ -35,34 +37,21 @@ COAST = 0.3  # s of rest after an approach, chosen
 TIMEOUT = 1.5  # of the planned duration, [guzman2015] section 6.1
 
 
-@lru_cache(maxsize=8)
-def _built(sizes: DoubleWheel, torque: float) -> SimRobot:
-    """The robot; building its rollers takes as long as half a trial, so that trials share it."""
-    return roller_robot(loc8_smdw(sizes).replace({"motors.all.torque": torque}))
-
-
 @dataclass(frozen=True)
 class StepScene:
-    """The step, what it is made of, and the robot's drives: lengths m, ``friction`` [-], ``torque``
-    N m a wheel."""
+    """The ``step``, the ``friction`` of what it is made of, and the ``robot`` that climbs it."""
 
-    height: float
-    place: tuple[float, float]
-    direction: float
+    step: Step
     friction: float
-    torque: float
-    minor_radius: float
-    hub_depth: float
-    hub_gap: float
+    robot: Robot
+
+    @property
+    def height(self) -> float:
+        """m."""
+        return self.step.height
 
     def scene(self) -> Scene:
-        return Scene(self.friction, Step(self.height, self.place, self.direction, width=8.0))
-
-    def robot(self) -> SimRobot:
-        radius = DEFAULT_WHEEL.radius
-        return _built(
-            DoubleWheel(radius, self.minor_radius, self.hub_depth, self.hub_gap), self.torque
-        )
+        return Scene(self.friction, Flat(), (self.step,))
 
 
 @dataclass(frozen=True)
@@ -120,12 +109,14 @@ class Rate:
         return wilson(self.successes, self.trials)
 
 
-def climb_command(climb: Climb, robot: SimRobot) -> Command:
+def climb_command(climb: Climb) -> Command:
     """Constant wheel speeds along the motion, reached within RAMP."""
+    robot = climb.step.robot
     speed = climb.speed * robot.wheels[0].radius
-    full = robot.wheel_speeds(speed * climb.motion[0], speed * climb.motion[1], 0.0)
+    full = robot.inverse @ np.array([speed * climb.motion[0], speed * climb.motion[1], 0.0])
     times = np.array([0.0, RAMP, CLIMB_TIME * (CLIMB_SPEED / climb.speed)])
-    return Command(times, np.vstack([np.zeros(4), full, full]), climb.pose, climb.wheels)
+    speeds = np.vstack([np.zeros(len(full)), full, full])
+    return Command(times, speeds, None, climb.pose, np.array(climb.wheels))
 
 
 def run_climb(climb: Climb, engine: str = "mujoco") -> Outcome:
@@ -135,8 +126,7 @@ def run_climb(climb: Climb, engine: str = "mujoco") -> Outcome:
 
 def record_climb(climb: Climb, engine: str = "mujoco") -> Recording:
     """Sub-test 2, all of its motion; errors of ``run_climb``."""
-    robot = climb.step.robot()
-    return make_engine(engine).run(robot, climb.step.scene(), climb_command(climb, robot))
+    return drive(climb.step.robot, climb.step.scene(), climb_command(climb), engine=engine)
 
 
 def judge(climb: Climb, recording: Recording) -> Outcome:
@@ -150,7 +140,7 @@ def judge(climb: Climb, recording: Recording) -> Outcome:
     lateral = climb.motion[0] == 0.0
     for i, travel in zip(climb.critical, climb.travel, strict=True):
         turned = np.abs(recording.wheel_angles[:, i] - recording.wheel_angles[0, i])
-        limit = travel / DEFAULT_WHEEL.radius + math.pi
+        limit = travel / climb.step.robot.wheels[i].radius + math.pi
         first &= bool(risen[:, i].any() and turned[np.argmax(risen[:, i])] <= limit)
         if not lateral:  # forward, the second wheel meets the step while the first one is climbing
             break
@@ -171,6 +161,7 @@ def run_approach(
     *,
     engine: str = "mujoco",
     controller: Controller | None = None,
+    sense: Sense = exact,
     rest: float = COAST,
 ) -> Recording:
     """Sub-test 1: execute an approach (its wheel speeds, or a controller) with the step standing
@@ -183,8 +174,10 @@ def run_approach(
     end = command.duration
     times = np.append(command.times, [end + 1e-6, end + extra])
     speeds = np.vstack([command.wheel_speeds, np.zeros((2, 4))])
-    longer = Command(times, speeds, command.start_pose, command.start_wheel_angles)
-    return make_engine(engine).run(step.robot(), step.scene(), longer, controller=controller)
+    longer = replace(command, times=times, wheel_speeds=speeds)
+    return drive(
+        step.robot, step.scene(), longer, engine=engine, controller=controller, sense=sense
+    )
 
 
 def reached(recording: Recording) -> tuple[tuple[float, float, float], Four]:

@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.robots.description import WheelSection
+from trajopt.simulate.double import hub_support
 
 CLOUD_POINTS = 36_000  # points a contour; spacing 1.8e-5 m on a 0.1 m wheel
 
@@ -98,9 +99,7 @@ class Meeting:
 def support_down(wheel: DoubleWheel, angle: ArrayLike) -> Array:
     """Distance (m) from the axle down to the lowest point of a hub turned by ``angle`` from
     ellipse-down."""
-    a = np.asarray(angle, dtype=np.float64)
-    ellipse = np.hypot(wheel.radius * np.sin(a), wheel.minor_radius * np.cos(a))
-    return np.where(np.cos(a) >= 0, ellipse, wheel.radius)
+    return hub_support(wheel.radius, wheel.minor_radius, angle)
 
 
 def contact_offset(wheel: DoubleWheel, angle: ArrayLike) -> Array:

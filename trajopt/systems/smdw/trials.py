@@ -18,13 +18,14 @@ import numpy as np
 from numpy.random import Generator
 
 from trajopt.arrays import Array, require_not_negative
-from trajopt.control.approach import Mode, Sensors, approach_controller
+from trajopt.control.approach import Mode, approach_controller
 from trajopt.control.bend import Goal
 from trajopt.errors import ArgumentError
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.problem import Problem
 from trajopt.simulate.check import SAMPLE_TIME
 from trajopt.simulate.engine import Command, Recording
+from trajopt.simulate.sensors import Sensors
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
 from trajopt.systems.smdw.climb import (
     Climb,
@@ -37,7 +38,7 @@ from trajopt.systems.smdw.climb import (
     run_approach,
 )
 from trajopt.systems.smdw.entry import WHEELS, free_ground, start_pose, step_of
-from trajopt.systems.smdw.planner import Configuration, Plan, travel_to_step, wheel_of
+from trajopt.systems.smdw.planner import Configuration, Plan, travel_to_step
 
 NEAREST = 0.004  # m, least gap to the step that a climb starts with; chosen
 
@@ -82,17 +83,9 @@ class ClimbTrial:
 def step_scene(problem: Problem, friction: float, torque: float | None = None) -> StepScene:
     """The problem's step and wheels with another friction and torque (N m a wheel; None: the
     problem's)."""
-    step, wheel = step_of(problem), wheel_of(problem)
-    return StepScene(
-        step.height,
-        step.place,
-        step.direction,
-        friction,
-        float(problem.robot.motor_array("torque").min()) if torque is None else torque,
-        wheel.minor_radius,
-        wheel.depth,
-        wheel.gap,
-    )
+    limit = problem.robot.motor_array("torque").min() if torque is None else torque
+    robot = problem.robot.replace({"motors.all.torque": float(limit)})
+    return StepScene(step_of(problem), friction, robot)
 
 
 def largest_wheel_speed(problem: Problem) -> float:
@@ -136,7 +129,13 @@ def approach_command(
     errors = rng.normal(0.0, [scatter.position, scatter.position, scatter.yaw])
     x, y, yaw = (float(v) for v in np.array(start_pose(problem)) + errors)
     wheels = problem.start_wheels + rng.normal(0.0, scatter.wheels, 4)
-    return Command(times, plan.trajectory.at(times).wheel_speeds, (x, y, yaw), four(wheels))
+    return Command(times, plan.trajectory.at(times).wheel_speeds, None, (x, y, yaw), wheels)
+
+
+def _angles(command: Command) -> Array:
+    """Start angles (4,) of an approach's wheels."""
+    assert command.start_wheel_angles is not None  # approach_command gives them
+    return command.start_wheel_angles
 
 
 def climb_trial(
@@ -182,17 +181,16 @@ def climb_trial(
         controller = approach_controller(
             plan.trajectory,
             problem.robot,
-            np.array(command.start_wheel_angles),
+            _angles(command),
             critical,
             cap=goal.cap,
             goal_wheels=goal.wheels,
             ground=free_ground(problem),
-            sensors=sensors,
             mode=control,
-            rng=rng,
         )
+        sense = (Sensors() if sensors is None else sensors).sense(rng)
         approach = run_controlled(
-            step, controller, command.start_pose, command.start_wheel_angles, engine=engine
+            step, controller, sense, command.start_pose, four(_angles(command)), engine=engine
         )
     ending = ending_of(approach, goal)
     if approach.exploded:
