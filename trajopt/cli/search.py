@@ -112,6 +112,8 @@ def validate(
         from trajopt.report.pictures import save_physics_picture
 
         save_physics_picture(solution, report, folder)
+        if report.recording.no_picture:
+            console.print(f"no engine.png: {report.recording.no_picture}", markup=False)
     console.print(f"written to {folder}", highlight=False, soft_wrap=True)
 
 

@@ -193,7 +193,8 @@ class Recording:
     ``wheel_heights`` m of the wheel centres, all (N, W); ``angles`` (N, S), ``swivels`` (N, C) rad;
     ``loads`` N and ``slip`` m/s (N, A); ``contacts`` (N,); ``hits`` of obstacles. ``exploded`` with
     its ``reason`` when the run was stopped because the numbers left physics. ``wall_time`` s of
-    stepping, ``real_time_factor`` simulated over wall time, ``picture`` (H, W, 3) uint8 when asked.
+    stepping, ``real_time_factor`` simulated over wall time, ``picture`` (H, W, 3) uint8 when asked;
+    where the engine found no graphics to draw it, ``no_picture`` says why.
     """
 
     engine: str
@@ -219,6 +220,7 @@ class Recording:
     wall_time: float
     real_time_factor: float
     picture: NDArray[np.uint8] | None = None
+    no_picture: str = ""
 
 
 class Session(Protocol):

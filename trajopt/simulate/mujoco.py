@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -357,7 +358,9 @@ class _Session:
         view.azimuth = 90.0 + math.degrees(camera.yaw)
         view.elevation = math.degrees(camera.pitch)
         try:
-            renderer = self.mujoco.Renderer(self.compiled, camera.height, camera.width)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # what is missing is said below, in one line
+                renderer = self.mujoco.Renderer(self.compiled, camera.height, camera.width)
         except Exception as error:  # the OpenGL back ends raise what they like
             advice = "set MUJOCO_GL=egl or osmesa, or take the picture with pybullet"
             raise SimulationError(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from trajopt.arrays import Array
 from trajopt.control.measured import Controller, Targets
-from trajopt.errors import ArgumentError
+from trajopt.errors import ArgumentError, SimulationError
 from trajopt.robots.robot import Robot
 from trajopt.simulate.build import build
 from trajopt.simulate.engine import (
@@ -187,9 +187,18 @@ def drive(
         begun = time.perf_counter()
         times, rows, reason = _driven(session, command, chosen, controller, sense)
         wall = time.perf_counter() - begun
-        image = session.render(picture) if picture is not None else None
+        image, no_picture = _drawn(session, picture)
     label = (chosen.name, importlib.metadata.version(chosen.name))
-    return _assembled(label, np.array(times), rows, reason, wall, image)
+    recording = _assembled(label, np.array(times), rows, reason, wall)
+    return replace(recording, picture=image, no_picture=no_picture)
+
+
+def _drawn(session: Session, camera: Camera | None) -> tuple[NDArray[np.uint8] | None, str]:
+    """The picture, or why there is none: a motion is not lost for want of graphics."""
+    try:
+        return (None if camera is None else session.render(camera)), ""
+    except SimulationError as error:
+        return None, str(error)
 
 
 def _driven(
@@ -226,7 +235,6 @@ def _assembled(
     rows: list[Observation],
     reason: str,
     wall: float,
-    image: NDArray[np.uint8] | None,
 ) -> Recording:
     def column(name: str) -> Array:
         return np.array([getattr(row, name) for row in rows])
@@ -256,7 +264,6 @@ def _assembled(
         reason=reason,
         wall_time=wall,
         real_time_factor=float(times[-1]) / wall,
-        picture=image,
     )
 
 
