@@ -46,8 +46,8 @@ def test_a_solution_that_does_not_hold(
     assert "nan" not in text.lower()
 
 
-def test_validation(drifted: ValidationReport) -> None:
-    text = text_of(validation_table(drifted))
+def test_validation(exact: Solution, drifted: ValidationReport) -> None:
+    text = text_of(validation_table(drifted, exact.problem.robot))
     assert "made-up 0.0" in text
     assert "+2.00 mm (+0.07 %)" in text
     assert "-1.00 mm (-0.03 %)" in text
