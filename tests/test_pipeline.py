@@ -16,6 +16,7 @@ import trajopt
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.optimize.base import Budget
 from trajopt.pipeline import solve, validate
+from trajopt.systems.smdw.thesis import through_drives
 from trajopt.timing.scaling import time_scale
 
 
@@ -51,16 +52,12 @@ def test_time_scaling_is_never_slower_than_linear(problem):
 
 
 def test_through_actuators_the_motion_is_nominal(scenario):
-    problem = scenario.replace(
-        {
-            "actuator.enabled": True,
-            "spline.free": ["p1", "p2", "heading"],
-            "limits": {"wheel_speed": 100.0},
-        }
+    problem = through_drives(
+        scenario, {"spline.free": ["p1", "p2", "heading"], "limits": {"wheel_speed": 100.0}}
     )
     solution = solve(problem)
     assert solution.trajectory.engine == "nominal"
-    assert solution.duration == pytest.approx(problem.spline.duration, rel=1e-9)
+    assert solution.duration == pytest.approx(problem.actuator.duration, rel=1e-9)
     assert solution.cost < 1e-7
     assert solution.holds, solution.faults
 
@@ -124,7 +121,7 @@ def test_the_check_starts_with_the_wheel_angles_that_the_plan_starts_with(scenar
     missed = (angles[-1] - np.asarray(problem.goal.wheels))[critical] / (2 * np.pi)
     assert np.abs(missed - np.round(missed)).max() * 2 * np.pi < 0.1
     assert np.abs(report.wheel_deviation[critical]).max() < 0.1
-    planned = start + trajectory.at(trajectory.duration).wheel_angles[0]
+    planned = trajectory.at(trajectory.duration).wheel_angles[0]
     np.testing.assert_allclose(report.wheel_deviation, angles[-1] - planned, atol=0.01)
 
 

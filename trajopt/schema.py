@@ -169,15 +169,32 @@ def json_schema(model: type[BaseModel]) -> str:
 
 
 def known_keys(section: list[str], whole: type[BaseModel]) -> list[str]:
-    """Keys of the section at a place of a file; numbers are elements of arrays of tables."""
-    model: Any = whole
+    """Keys of the section at a place of a file; numbers are elements of arrays of tables, and the
+    ``kind`` of a union of models its tag."""
+    models: list[Any] = [whole]
     for name in section:
-        if name.isdigit() or name not in getattr(model, "model_fields", {}):
-            continue  # an element of an array, or the tag of a union
-        model = model.model_fields[name].annotation
-        while get_origin(model) in (tuple, Union, UnionType, Annotated):
-            model = next(a for a in get_args(model) if a is not type(None))
-    return [key for key in getattr(model, "model_fields", {"": None}) if key != "source"]
+        tagged = [m for m in models if name in _tags(m)]
+        fields = {f.alias or key: f for key, f in models[0].model_fields.items()}
+        if tagged:
+            models = tagged
+        elif name in fields:
+            models = list(_models(fields[name].annotation)) or models
+    known = models[0].model_fields
+    return [f.alias or key for key, f in known.items() if key != "source"]
+
+
+def _tags(model: Any) -> tuple[Any, ...]:
+    kind = model.model_fields.get("kind")
+    return get_args(kind.annotation) if kind else ()
+
+
+def _models(annotation: Any) -> Iterator[Any]:
+    """The models in an annotation: of an optional section, an array of them, a union."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    elif get_origin(annotation) in (tuple, Union, UnionType, Annotated):
+        for part in get_args(annotation):
+            yield from _models(part)
 
 
 def _as_json(value: Any) -> Any:

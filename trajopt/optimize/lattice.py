@@ -19,6 +19,7 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, LatticeObjective, Objective
 from trajopt.optimize.base import (
+    FEASIBLE,
     Run,
     Status,
     best_index,
@@ -117,8 +118,8 @@ class Lattice(Method):
                 run.nit += 1
                 outcome = solve_residuals(run, objective, x, k)
                 run.propose(outcome.x)
-                run.evaluate(outcome.x[None])
-                if outcome.solved:
+                judged = run.evaluate(outcome.x[None])
+                if outcome.solved and judged.violation[0] <= FEASIBLE:
                     return Status.CONVERGED, f"exact after {run.nit} Newton solves"
             width = run.bounds[:, 1] - run.bounds[:, 0]
             base = run.bounds.mean(axis=1) + 0.8 * width * (rng.random(len(width)) - 0.5)
@@ -148,8 +149,8 @@ class Lattice(Method):
         if Capability.AFFINE not in objective.provides:
             outcome = solve_residuals(run, objective, best, objective.nearest_turns(best[None])[0])
             run.propose(outcome.x)
-            run.evaluate(outcome.x[None])
-            if outcome.solved:
+            found = run.evaluate(outcome.x[None])
+            if outcome.solved and found.violation[0] <= FEASIBLE:
                 return (
                     Status.CONVERGED,
                     "exact through the actuators, though no lattice point is inside the bounds",
