@@ -8,13 +8,8 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
-from trajopt.control.commands import (
-    commands,
-    compare_log,
-    driven,
-    export_commands,
-    sample_time_study,
-)
+from benchmarks.theses.powerbot_study import sample_time_study
+from trajopt.control.commands import commands, compare_log, driven, export_commands
 from trajopt.control.tracking import Disturbance, Tracker, track
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration

@@ -20,7 +20,6 @@ from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
 _SMALL_TURN = 1e-9  # rad in one step below which a step is straight
-_FINE = 0.01  # s between points where speeds are compared; chosen
 LOG_COLUMNS = ("t", "x", "y", "yaw", "v")
 _MOST_COMMANDS = 1_000_000  # of one motion, chosen: a microsecond is no sample time of a drive
 
@@ -38,15 +37,6 @@ class Commands:
     @property
     def duration(self) -> float:
         return float(self.times[-1] + self.sample_time)
-
-
-class StudyRow(NamedTuple):
-    """One sample time: error norm of the speed (m/s, eq. 3.10) and error of the final position (m,
-    eq. 3.11)."""
-
-    sample_time: float
-    speed_error: float
-    goal_error: float
 
 
 class Comparison(NamedTuple):
@@ -88,7 +78,11 @@ def commands(
             f"at most {_MOST_COMMANDS:,} commands: "
             f"{trajectory.duration / _MOST_COMMANDS:.2g} s or more",
         )
-    robot = _robot(trajectory)
+    robot = trajectory.robot
+    if robot is None:
+        raise ArgumentError(
+            "trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))"
+        )
     half_track(robot)
     count = max(int(np.ceil(trajectory.duration / sample_time - 1e-9)), 1)
     edges = sample_time * np.arange(count + 1, dtype=np.float64)
@@ -122,23 +116,6 @@ def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array)
         [pose[i, :2] + _arc(pose[i, 2], v[i], w[i], after), pose[i, 2] + w[i] * after]
     )
     return np.asarray(here)
-
-
-def sample_time_study(
-    trajectory: Trajectory, sample_times: Sequence[float], rule: Literal["held", "mean"] = "held"
-) -> list[StudyRow]:
-    """Tables 1 and 2 of [waheed2006] without its disturbances: what digitising alone costs."""
-    robot, rows = _robot(trajectory), []
-    start, goal = trajectory.at([0.0, trajectory.duration]).pose
-    for sample_time in sample_times:
-        orders = commands(trajectory, sample_time, rule=rule)
-        t = np.arange(0.0, trajectory.duration, _FINE)
-        i = np.clip((t / sample_time).astype(np.intp), 0, len(orders.times) - 1)
-        given = (orders.left[i] + orders.right[i]) / 2
-        error = float(np.sqrt(np.mean((given - trajectory.at(t).twist[:, 0]) ** 2)))
-        end = driven(orders, robot, start, np.array([orders.duration]))[0]
-        rows.append(StudyRow(sample_time, error, float(np.hypot(*(end - goal)[:2]))))
-    return rows
 
 
 def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
@@ -206,14 +183,6 @@ def _read_log(path: FilePath) -> Array:
             "log", str(path), "two or more rows of finite numbers, times rising from >= 0"
         )
     return log
-
-
-def _robot(trajectory: Trajectory) -> Robot:
-    if trajectory.robot is None:
-        raise ArgumentError(
-            "trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))"
-        )
-    return trajectory.robot
 
 
 def _arc(yaw: Array, v: Array, w: Array, t: Array) -> Array:

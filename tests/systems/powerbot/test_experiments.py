@@ -14,6 +14,7 @@ from benchmarks.theses.powerbot_identify import (
     centre_of_gravity,
     friction_from_pulls,
 )
+from benchmarks.theses.powerbot_study import linear_factor
 from trajopt.control.commands import commands
 from trajopt.errors import InfeasibleError, ProblemError
 from trajopt.limits.speed import Speed
@@ -28,7 +29,6 @@ from trajopt.systems.powerbot.limits import (
     thesis_slip_acceleration,
     thesis_tip_acceleration,
 )
-from trajopt.timing.linear import linear_factor
 from trajopt.timing.scaling import time_scale
 from trajopt.world.ramp import Ramp, lay_over
 
