@@ -11,13 +11,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from PIL import Image
+
 from benchmarks.common import ROOT
-from trajopt.bench.pictures import (
+from trajopt.bench.page import (
     answer_lines,
     peer_lines,
     run_line,
     share_lines,
-    small_picture,
     write_report,
 )
 from trajopt.bench.tables import BenchTables
@@ -25,6 +26,7 @@ from trajopt.sweeps.store import open_store
 
 PAGE = ROOT / "docs" / "pso_vs_gradient.md"
 PICTURES = ("families", "ecdf", "profiles")
+COLOURS = 48  # of a picture, chosen
 
 
 def main() -> None:
@@ -51,6 +53,12 @@ def main() -> None:
         small_picture(
             report / f"{name}.png", PAGE.parent / "pictures" / f"pso_vs_gradient_{name}.png"
         )
+
+
+def small_picture(source: Path, target: Path) -> None:
+    """The PNG ``source`` with few colours, for a page in a repository: a third of its size."""
+    with Image.open(source) as picture:
+        picture.convert("RGB").quantize(COLOURS).save(target, optimize=True)
 
 
 def replaced(text: str, name: str, new: str) -> str:

@@ -34,6 +34,7 @@ from benchmarks.theses.asoc_reference import (
     TABLE_9,
     TABLE_10,
 )
+from benchmarks.theses.asoc_study import best_ratio, best_width, full_factorial, square_corners
 from benchmarks.theses.asoc_suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from benchmarks.theses.asoc_tables_tracking import (
     FAST,
@@ -59,15 +60,14 @@ from trajopt.optimize.search import minimize, optimizer_names
 from trajopt.report.robot_picture import robot_figure
 from trajopt.report.style import in_style, save_figure
 from trajopt.robots.mobility import mobility_of
-from trajopt.systems.asoc.design import TERMS, AsocDesign, Model, best_width, full_factorial
-from trajopt.systems.asoc.isotropy import Contact, best_ratio, mean_isotropy, spread_modules
+from trajopt.systems.asoc.design import TERMS, AsocDesign, Model
+from trajopt.systems.asoc.isotropy import Contact, mean_isotropy, spread_modules
 from trajopt.systems.asoc.modules import (
     asoc_robot,
     largest_pivot,
     link_velocities,
     wheel_steering,
 )
-from trajopt.systems.asoc.reference import square_corners
 from trajopt.systems.asoc.run import AsocRun
 from trajopt.systems.asoc.soil import soil_named
 from trajopt.systems.asoc.tracking import Knowledge

@@ -10,12 +10,13 @@ import numpy as np
 
 from benchmarks.common import ResultTable
 from benchmarks.theses.asoc_reference import TABLE_9, TABLE_10
+from benchmarks.theses.asoc_study import constant_speed, square_corners
 from trajopt.arrays import Array
 from trajopt.errors import SimulationError
 from trajopt.systems.asoc.bullet import asoc_in_pybullet
 from trajopt.systems.asoc.modules import AsocGeometry
 from trajopt.systems.asoc.mujoco import asoc_in_mujoco
-from trajopt.systems.asoc.reference import Reference, constant_speed, planned_speed, square_corners
+from trajopt.systems.asoc.reference import Reference, planned_speed
 from trajopt.systems.asoc.run import AsocRun
 from trajopt.systems.asoc.tracking import FRICTION, Knowledge, Tracking, track_many
 from trajopt.world.height_map import HeightMap

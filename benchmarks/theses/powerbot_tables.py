@@ -16,9 +16,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.common import OUT, PROBLEMS, ROOT, ResultTable, publish
-from trajopt.control.commands import sample_time_study
+from benchmarks.theses.powerbot_study import halving_plan, linear_factor, sample_time_study
 from trajopt.control.encounter import Visitor, course, safe_speed, visited_world
-from trajopt.control.replan import TIME_STEP, Run, Sensor, halving_plan, replan, run_encounter
+from trajopt.control.replan import TIME_STEP, Run, Sensor, replan, run_encounter
 from trajopt.control.tracking import Tracker
 from trajopt.errors import TrajoptError
 from trajopt.limits.limit import Limit
@@ -36,7 +36,6 @@ from trajopt.systems.powerbot.constants import (
     SONAR_RANGE,
 )
 from trajopt.systems.powerbot.limits import thesis_slip_acceleration, thesis_tip_acceleration
-from trajopt.timing.linear import linear_factor
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ramp import lay_over

@@ -43,15 +43,16 @@ from benchmarks.theses.smdw_searches import (
     searches,
     swarms,
 )
+from benchmarks.theses.smdw_study import CLOUD_POINTS, meet_step_cloud, terminal_cost
 from trajopt.arrays import fold
-from trajopt.objectives.terminal import terminal_cost, terminal_objective
+from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.search import minimize
 from trajopt.problem import Problem, load_problem
 from trajopt.report.style import in_style, save_figure
 from trajopt.simulate.engine import ENGINES
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
 from trajopt.systems.smdw.entry import WHEELS
-from trajopt.systems.smdw.geometry import CLOUD_POINTS, contact_offset, meet_step, meet_step_cloud
+from trajopt.systems.smdw.geometry import contact_offset, meet_step
 from trajopt.systems.smdw.pictures import plans_figure
 from trajopt.systems.smdw.planner import plan_climb
 from trajopt.systems.smdw.thesis import through_drives

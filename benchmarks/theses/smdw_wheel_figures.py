@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from benchmarks.theses.smdw_study import outline
 from trajopt.problem import Problem
 from trajopt.report.ground_plan import draw_robot
 from trajopt.report.style import (
@@ -26,7 +27,7 @@ from trajopt.systems.smdw.climbing import (
     climb_window,
 )
 from trajopt.systems.smdw.entry import start_pose, step_of
-from trajopt.systems.smdw.geometry import DoubleWheel, contact_offset, meet_step, outline
+from trajopt.systems.smdw.geometry import DoubleWheel, contact_offset, meet_step
 from trajopt.systems.smdw.pictures import draw_ground
 
 

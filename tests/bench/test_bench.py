@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from trajopt.bench.comparison import BenchPlan, best_costs, load_bench, run_bench
-from trajopt.bench.pictures import write_report
+from trajopt.bench.page import write_report
 from trajopt.bench.problems import bench_problem
 from trajopt.bench.profiles import (
     data_profile,

@@ -9,14 +9,9 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
+from benchmarks.theses.powerbot_study import sample_time_study
 from trajopt.control.approach import Estimate, predict
-from trajopt.control.commands import (
-    commands,
-    compare_log,
-    driven,
-    export_commands,
-    sample_time_study,
-)
+from trajopt.control.commands import commands, compare_log, driven, export_commands
 from trajopt.control.measured import Measured
 from trajopt.control.tracking import PERIOD, Tracker, TrackingController
 from trajopt.errors import ArgumentError
@@ -39,11 +34,7 @@ def plan() -> Trajectory:
 def test_mean_commands_end_at_the_planned_wheel_angles(plan: Trajectory) -> None:
     for sample_time in (0.07, 0.5):
         orders = commands(plan, sample_time)
-        turned = (
-            np.array([orders.left.sum(), orders.right.sum()])
-            * sample_time
-            / shipped("powerbot").wheels[0].radius
-        )
+        turned = orders.speeds.sum(axis=0) * sample_time / shipped("powerbot").wheels[0].radius
         assert turned == pytest.approx(plan.at(plan.duration).wheel_angles[0], rel=1e-9)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.theses.powerbot_study import halving_plan
 from trajopt.control.encounter import (
     Course,
     Obstacle,
@@ -19,7 +20,6 @@ from trajopt.control.replan import (
     Sensor,
     SpeedPlan,
     at_rest,
-    halving_plan,
     replan,
     run_encounter,
     stops_in_time,

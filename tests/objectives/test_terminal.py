@@ -13,15 +13,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from smdw_problems import ROOT, smdw_problem
 
+from benchmarks.theses.smdw_study import terminal_cost
 from trajopt.arrays import fold
 from trajopt.errors import ArgumentError
 from trajopt.objectives.rollout import Kinematics
-from trajopt.objectives.terminal import (
-    TerminalObjective,
-    terminal_cost,
-    terminal_objective,
-    with_free,
-)
+from trajopt.objectives.terminal import TerminalObjective, terminal_objective, with_free
 from trajopt.optimize.lattice import lattice_points
 from trajopt.robots.robot import robot as shipped
 from trajopt.systems.smdw.thesis import through_drives

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.theses.asoc_study import wheel_frame
 from benchmarks.theses.textbook import TEXTBOOK, planar
 from benchmarks.theses.textbook import wheel as textbook_wheel
 from trajopt.errors import ArgumentError
@@ -32,7 +33,6 @@ from trajopt.systems.asoc.modules import (
     link_velocities,
     module_inverse,
     module_jacobian,
-    wheel_frame,
     wheel_positions,
     wheel_steering,
 )

@@ -9,14 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.theses.asoc_study import (
+    best_ratio,
+    best_width,
+    constant_speed,
+    full_factorial,
+    square_corners,
+)
 from benchmarks.theses.asoc_suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from benchmarks.theses.textbook import TEXTBOOK
 from tests.systems.golden_data import Figures
 from trajopt.robots.mobility import mobility_of
-from trajopt.systems.asoc.design import TERMS, AsocDesign, Model, best_width, full_factorial
-from trajopt.systems.asoc.isotropy import Contact, best_ratio, mean_isotropy, spread_modules
+from trajopt.systems.asoc.design import TERMS, AsocDesign, Model
+from trajopt.systems.asoc.isotropy import Contact, mean_isotropy, spread_modules
 from trajopt.systems.asoc.modules import AsocGeometry, largest_pivot
-from trajopt.systems.asoc.reference import constant_speed, square_corners
 from trajopt.systems.asoc.soil import SOILS
 from trajopt.systems.asoc.tracking import Knowledge, track_many
 from trajopt.world.rough import rough_ground

@@ -7,9 +7,10 @@ from typing import Literal
 
 import numpy as np
 
+from benchmarks.theses.powerbot_study import halving_plan, linear_factor
 from tests.systems.golden_data import ROOT, Figures, rows_of
 from trajopt.control.encounter import Visitor, course, safe_speed, visited_world
-from trajopt.control.replan import Sensor, halving_plan, replan, run_encounter
+from trajopt.control.replan import Sensor, replan, run_encounter
 from trajopt.limits.slip import Slip
 from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path as RobotPath
@@ -23,7 +24,6 @@ from trajopt.systems.powerbot.limits import (
     thesis_slip_acceleration,
     thesis_tip_acceleration,
 )
-from trajopt.timing.linear import linear_factor
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 

@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 from smdw_problems import SMDW, smdw_problem
 
+from benchmarks.theses.smdw_study import terminal_cost
 from tests.systems.golden_data import ROOT, Figures, rows_of
-from trajopt.objectives.terminal import terminal_cost
 from trajopt.pipeline import Solution, solve, validate
 from trajopt.problem import load_problem
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scaling_cases import PATHS, ROBOTS, limit
 
+from benchmarks.theses.powerbot_study import linear_factor
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
-from trajopt.timing.linear import linear_factor
 from trajopt.timing.scaling import rough_duration, time_scale
 from trajopt.timing.segments import segment_factors
 from trajopt.timing.sensitivity import sensitivities

@@ -98,7 +98,7 @@ def report(
     ] = None,
 ) -> None:
     """Write the page: tables (Markdown, CSV), profiles (PNG, SVG) and the answers in words."""
-    from trajopt.bench.pictures import write_report
+    from trajopt.bench.page import write_report
     from trajopt.sweeps.store import open_store
 
     page = write_report(open_store(store, create=False), out or store / "report")

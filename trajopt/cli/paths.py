@@ -59,7 +59,7 @@ def export(
     ] = "mean",
     set_: Overrides = None,
 ) -> None:
-    """Write wheel speed commands (t, v_left, v_right) of a differential drive."""
+    """Write speed commands for every wheel: t (s), v_<wheel> (m/s at the rim)."""
     from trajopt.control.commands import commands, export_commands
 
     if rule not in ("mean", "held"):

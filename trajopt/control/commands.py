@@ -1,6 +1,6 @@
-"""Wheel speed commands of a differential drive, and what the robot did with them.
+"""Wheel speed commands of a robot, and what it did with them.
 
-Commands are linear wheel speeds (m/s) held over one sample time, as [waheed2006] hands them over
+Commands are speeds of the wheels' rims (m/s) held over one sample time, as [waheed2006] hands them over
 (section 3.5).
 """
 
@@ -20,33 +20,23 @@ from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
 _SMALL_TURN = 1e-9  # rad in one step below which a step is straight
-_FINE = 0.01  # s between points where speeds are compared; chosen
 LOG_COLUMNS = ("t", "x", "y", "yaw", "v")
 _MOST_COMMANDS = 1_000_000  # of one motion, chosen: a microsecond is no sample time of a drive
 
 
 @dataclass(frozen=True, eq=False)
 class Commands:
-    """Speeds ``left`` and ``right`` (N,), m/s, of the wheels, each held from ``times`` (N,), s, for
+    """Speeds (N, W), m/s, of the rims of the ``wheels``, each held from ``times`` (N,), s, for
     ``sample_time``."""
 
     times: Array
-    left: Array
-    right: Array
+    speeds: Array
+    wheels: tuple[str, ...]
     sample_time: float
 
     @property
     def duration(self) -> float:
         return float(self.times[-1] + self.sample_time)
-
-
-class StudyRow(NamedTuple):
-    """One sample time: error norm of the speed (m/s, eq. 3.10) and error of the final position (m,
-    eq. 3.11)."""
-
-    sample_time: float
-    speed_error: float
-    goal_error: float
 
 
 class Comparison(NamedTuple):
@@ -78,7 +68,7 @@ def commands(
     "held": the speed at the start of each interval (eqs. 3.7 to 3.9, as the thesis digitises).
     "mean": the wheel's turn over the interval divided by its length, so that the wheels end at the
     planned angles. The last interval is stretched to whole samples and holds what is left. Raises
-    ArgumentError for a sample time that is not positive, or a robot that is no differential drive.
+    ArgumentError for a sample time that is not positive, or a trajectory without a robot.
     """
     require_positive("sample_time", sample_time, "s")
     if trajectory.duration / sample_time > _MOST_COMMANDS:
@@ -88,8 +78,11 @@ def commands(
             f"at most {_MOST_COMMANDS:,} commands: "
             f"{trajectory.duration / _MOST_COMMANDS:.2g} s or more",
         )
-    robot = _robot(trajectory)
-    half_track(robot)
+    robot = trajectory.robot
+    if robot is None:
+        raise ArgumentError(
+            "trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))"
+        )
     count = max(int(np.ceil(trajectory.duration / sample_time - 1e-9)), 1)
     edges = sample_time * np.arange(count + 1, dtype=np.float64)
     state = trajectory.at(np.minimum(edges, trajectory.duration))
@@ -100,19 +93,20 @@ def commands(
         speeds = np.diff(state.wheel_angles, axis=0) * radius / sample_time
     else:
         raise ArgumentError("rule", rule, "held or mean")
-    return Commands(edges[:-1], speeds[:, 0], speeds[:, 1], sample_time)
+    return Commands(edges[:-1], speeds, robot.wheel_names, sample_time)
 
 
 def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array) -> Array:
-    """(N, 3): poses (m, m, rad) at ``times`` (N,) s of a drive that executes the commands without
-    slip.
+    """(N, 3): poses (m, m, rad) at ``times`` (N,) s of a differential drive that executes the
+    commands without slip. Raises ArgumentError for another robot.
 
     Exact: wheel speeds are constant in an interval, so the robot moves on an arc.
     """
     width = 2 * half_track(robot)
     pose = np.empty((len(orders.times) + 1, 3))
     pose[0] = start
-    v, w = (orders.left + orders.right) / 2, (orders.right - orders.left) / width
+    left, right = orders.speeds.T
+    v, w = (left + right) / 2, (right - left) / width
     pose[1:, 2] = start[2] + np.cumsum(w * orders.sample_time)
     moved = _arc(pose[:-1, 2], v, w, np.full(len(v), orders.sample_time))
     pose[1:, :2] = np.asarray(start[:2]) + np.cumsum(moved, axis=0)
@@ -124,32 +118,16 @@ def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array)
     return np.asarray(here)
 
 
-def sample_time_study(
-    trajectory: Trajectory, sample_times: Sequence[float], rule: Literal["held", "mean"] = "held"
-) -> list[StudyRow]:
-    """Tables 1 and 2 of [waheed2006] without its disturbances: what digitising alone costs."""
-    robot, rows = _robot(trajectory), []
-    start, goal = trajectory.at([0.0, trajectory.duration]).pose
-    for sample_time in sample_times:
-        orders = commands(trajectory, sample_time, rule=rule)
-        t = np.arange(0.0, trajectory.duration, _FINE)
-        i = np.clip((t / sample_time).astype(np.intp), 0, len(orders.times) - 1)
-        given = (orders.left[i] + orders.right[i]) / 2
-        error = float(np.sqrt(np.mean((given - trajectory.at(t).twist[:, 0]) ** 2)))
-        end = driven(orders, robot, start, np.array([orders.duration]))[0]
-        rows.append(StudyRow(sample_time, error, float(np.hypot(*(end - goal)[:2]))))
-    return rows
-
-
 def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
-    """Write (t, v_left, v_right), s and m/s, as CSV for a robot; ends with a row of zeros."""
+    """Write t (s) and a column v_<wheel> (m/s) a wheel as CSV for a robot; ends with a row of
+    zeros."""
     path = FilePath(file)
     with path.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(["t", "v_left", "v_right"])
-        for t, left, right in zip(orders.times, orders.left, orders.right, strict=True):
-            writer.writerow([f"{t:.6g}", f"{left:.9g}", f"{right:.9g}"])
-        writer.writerow([f"{orders.duration:.6g}", "0", "0"])
+        writer.writerow(["t", *(f"v_{name}" for name in orders.wheels)])
+        for t, row in zip(orders.times, orders.speeds, strict=True):
+            writer.writerow([f"{t:.6g}", *(f"{speed:.9g}" for speed in row)])
+        writer.writerow([f"{orders.duration:.6g}", *("0" for _ in orders.wheels)])
     return path
 
 
@@ -206,14 +184,6 @@ def _read_log(path: FilePath) -> Array:
             "log", str(path), "two or more rows of finite numbers, times rising from >= 0"
         )
     return log
-
-
-def _robot(trajectory: Trajectory) -> Robot:
-    if trajectory.robot is None:
-        raise ArgumentError(
-            "trajectory", "no robot", "a trajectory with a robot (time_scale(..., robot=...))"
-        )
-    return trajectory.robot
 
 
 def _arc(yaw: Array, v: Array, w: Array, t: Array) -> Array:

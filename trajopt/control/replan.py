@@ -24,7 +24,6 @@ TIME_STEP = 0.02  # s between samples of a plan; chosen
 # Shares of full braking (< 0) and full acceleration (> 0) tried a cycle; chosen: fine near a
 # constant speed, so that the safe speed is approached and not jumped across at every scan.
 _LEVELS = np.array([-1.0, -0.5, -0.25, -0.1, -0.03, 0.0, 0.1, 0.4, 1.0])
-_CREEP = 0.05  # m/s; the halving rule stops below it; chosen
 _STILL = 0.02  # m/s, chosen: a real robot below it counts as standing (contacts give way by less)
 _PLACE = 1e-6  # m; nearer than this to the end counts as arrived
 
@@ -101,33 +100,6 @@ def stops_in_time(where: Course, sensor: Sensor, plan: SpeedPlan, seen: Sequence
     """Whether ``plan``, from its start to rest, is clear of all that it knows and of all that it
     cannot see."""
     return _accepted(where, sensor, plan.s, plan.v, seen)
-
-
-def halving_plan(
-    where: Course, sensor: Sensor, current: SpeedPlan, now: float, seen: Sequence[Obstacle]
-) -> SpeedPlan:
-    """The thesis's rule (section 3.6): half a cycle on, then half the speed; resume by doubling.
-
-    An obstacle counts as in the way when it is within reach of the outline ahead. It promises
-    nothing: the stopping distance is not looked at. The recovery is ambiguous in the thesis; here
-    the speed doubles every cycle, from a creep, up to the plan's.
-    """
-    half = max(round(sensor.scan_time / 2 / TIME_STEP), 1)
-    s0, v0 = (float(x[0]) for x in current.sampled(now, 1))
-    slower = 0.5 * v0 if 0.5 * v0 > _CREEP else 0.0
-    wanted = [v0] * half + [slower] * half if seen else [max(2 * v0, 2 * _CREEP)] * (2 * half)
-    s_list, v_list = [s0], [v0]
-    drop = float(where.braking.min()) * TIME_STEP
-    while wanted or v_list[-1] > 0:
-        v = (
-            wanted.pop(0) if wanted else max(v_list[-1] - drop, 0.0)
-        )  # behind the cycle: a full brake
-        beyond = s_list[-1] + v * TIME_STEP
-        if beyond < where.length:
-            v = min(v, float(where.speed(np.array([beyond]))[0]))
-        s_list.append(min(s_list[-1] + v * TIME_STEP, where.length))
-        v_list.append(v if s_list[-1] < where.length else 0.0)
-    return SpeedPlan(now, np.array(s_list), np.array(v_list))
 
 
 def _choices(where: Course, s: float, v: float, cycle: int) -> list[tuple[Array, Array]]:

@@ -452,20 +452,6 @@ def swarm_engine() -> str:
     return "numba" if importlib.util.find_spec("numba") else "numpy"
 
 
-def terminal_cost(
-    pose_deviation: Array,
-    wheel_deviation: Array,
-    pose_gains: Array,
-    wheel_gains: Array,
-    period: float = 2 * np.pi,
-) -> float:
-    """Table 4.4 from deviations alone: pose (3,), wheels (4,), with gains (3,) and (4,)."""
-    return float(
-        np.dot(pose_gains, np.abs(pose_deviation))
-        + np.dot(wheel_gains, np.abs(fold(np.asarray(wheel_deviation), period)))
-    )
-
-
 def terminal_objective(problem: Problem, *, steps: int = SEARCH_STEPS) -> TerminalObjective:
     """The terminal objective of a problem on its own robot."""
     return TerminalObjective(problem, problem.robot, steps)

@@ -13,22 +13,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.theses.asoc_study import best_width, full_factorial
 from benchmarks.theses.pareto import nondominated, pareto_front
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import Budget
 from trajopt.optimize.ipopt import Ipopt
 from trajopt.optimize.pso import thesis_enhanced, thesis_first
 from trajopt.optimize.search import OPTIMIZERS, minimize, optimizer_names
-from trajopt.systems.asoc.design import (
-    BOUNDS,
-    LEVELS,
-    TERMS,
-    AsocDesign,
-    Model,
-    best_width,
-    full_factorial,
-    grid,
-)
+from trajopt.systems.asoc.design import BOUNDS, LEVELS, TERMS, AsocDesign, Model, grid
 from trajopt.systems.asoc.isotropy import mean_isotropy, spread_modules
 from trajopt.systems.asoc.isotropy_curve import isotropy_curve
 from trajopt.systems.asoc.soil import SOILS, soil_named

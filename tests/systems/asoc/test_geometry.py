@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.theses.asoc_study import wheel_frame, workspaces_clear
 from benchmarks.theses.asoc_suspension import (
     POINT_DESIGN,
     POINT_TRAVEL,
@@ -17,10 +18,8 @@ from trajopt.errors import ArgumentError
 from trajopt.systems.asoc.modules import (
     AsocGeometry,
     largest_pivot,
-    wheel_frame,
     wheel_positions,
     workspace_radius,
-    workspaces_clear,
 )
 
 

@@ -6,15 +6,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.theses.asoc_study import best_ratio
 from trajopt.errors import ArgumentError
 from trajopt.robots.mobility import forward_at, inverse_at
-from trajopt.systems.asoc.isotropy import (
-    Contact,
-    best_ratio,
-    isotropy,
-    mean_isotropy,
-    spread_modules,
-)
+from trajopt.systems.asoc.isotropy import Contact, isotropy, mean_isotropy, spread_modules
 from trajopt.systems.asoc.modules import AsocGeometry, asoc_robot, wheel_steering
 
 # [udengaard2008], Table I by converged quadrature (an independent computation): N, lost, partial ->

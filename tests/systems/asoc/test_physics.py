@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.theses.asoc_study import constant_speed, square_corners
 from trajopt.errors import ArgumentError, ProblemError, SimulationError
 from trajopt.systems.asoc.bullet import asoc_in_pybullet, asoc_urdf
 from trajopt.systems.asoc.modules import TOTAL_MASS, AsocGeometry
 from trajopt.systems.asoc.mujoco import asoc_in_mujoco, asoc_mjcf
-from trajopt.systems.asoc.reference import constant_speed, planned_speed, square_corners
+from trajopt.systems.asoc.reference import planned_speed
 from trajopt.systems.asoc.run import AsocBody, _pose
 from trajopt.systems.asoc.tracking import Knowledge
 from trajopt.world.height_map import HeightMap

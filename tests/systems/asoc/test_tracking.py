@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from benchmarks.theses.asoc_study import constant_speed, require_pivots, square_corners
 from benchmarks.theses.asoc_tables_tracking import (
     FAST,
     FULL,
@@ -22,12 +23,7 @@ from benchmarks.theses.asoc_tables_tracking import (
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.systems.asoc.grip import SLIP_STIFFNESS, wheel_lag
 from trajopt.systems.asoc.modules import AsocGeometry, link_velocities, module_jacobian
-from trajopt.systems.asoc.reference import (
-    constant_speed,
-    planned_speed,
-    require_pivots,
-    square_corners,
-)
+from trajopt.systems.asoc.reference import planned_speed
 from trajopt.systems.asoc.tracking import (
     FRICTION,
     POSITION_GAIN,

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.theses.smdw_study import lifting_torque, meet_step_cloud, outline
 from trajopt.errors import ArgumentError
 from trajopt.systems.smdw.climbing import (
     DEFAULT_WHEEL,
@@ -19,19 +20,11 @@ from trajopt.systems.smdw.climbing import (
     covers_climb,
     forward_alphas,
     lift,
-    lifting_torque,
     loc8_smdw,
     region_of_contact,
     verdict,
 )
-from trajopt.systems.smdw.geometry import (
-    DoubleWheel,
-    contact_offset,
-    meet_step,
-    meet_step_cloud,
-    outline,
-    support_down,
-)
+from trajopt.systems.smdw.geometry import DoubleWheel, contact_offset, meet_step, support_down
 
 
 def turned(angle: float) -> np.ndarray:

@@ -12,8 +12,8 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from benchmarks.theses import closed_loop, smdw_figures, smdw_page, smdw_printed, smdw_searches
+from benchmarks.theses.smdw_study import terminal_cost
 from benchmarks.theses.smdw_trial_figures import ClimbCell
-from trajopt.objectives.terminal import terminal_cost
 
 EXACT, PSO, UNIFORM = smdw_page.SOURCE_NAMES.values()
 

@@ -212,32 +212,3 @@ def grid(bounds: Array, levels: int) -> tuple[Array, ...]:
     return tuple(
         axis.reshape([-1 if k == i else 1 for k in range(len(axes))]) for i, axis in enumerate(axes)
     )
-
-
-def full_factorial(design: AsocDesign, levels: int = LEVELS) -> tuple[Array, float]:
-    """The best feasible design (4,) and its J among levels^4 on the design's bounds (section 3.2).
-
-    The open grid lets each formula run only over the variables it has. Raises ArgumentError for
-    fewer than 2 levels or when no design is feasible.
-    """
-    if levels < 2:
-        raise ArgumentError("levels", levels, "at least 2 levels a variable")
-    columns = grid(design.bounds, levels)
-    value = np.where(np.minimum(*design.slack(*columns)) >= 0, design.total(*columns), -np.inf)
-    best = np.unravel_index(int(np.argmax(value)), value.shape)
-    if not np.isfinite(value[best]):
-        raise ArgumentError(
-            "levels", levels, "a grid that holds a feasible design; take more levels"
-        )
-    return np.array([column.ravel()[i] for column, i in zip(columns, best, strict=True)]), float(
-        value[best]
-    )
-
-
-def best_width(design: AsocDesign, offset: float, split: float, radius: float) -> float:
-    """Width (m) of the widest range at given other sizes: only d_max depends on it. Resolution 0.01
-    mm."""
-    low, high = BOUNDS[3]
-    widths = np.arange(low, high, 1e-5)
-    distance = design.terms(offset, split, radius - offset, widths)[3]
-    return float(widths[int(np.argmax(distance))])

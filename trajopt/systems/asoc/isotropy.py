@@ -174,18 +174,6 @@ def mean_isotropy(
     return MeanIsotropy(float(np.mean(means)), float(np.std(means, ddof=1) / np.sqrt(shifts)))
 
 
-def best_ratio(values: Array, ratios: Array) -> tuple[float, float]:
-    """Ratio and value at the top of a sampled curve, by a parabola through the three highest
-    neighbours."""
-    i = int(np.clip(np.argmax(values), 1, len(values) - 2))
-    left, middle, right = values[i - 1 : i + 2]
-    bend = left - 2 * middle + right
-    shift = 0.0 if bend == 0 else float(np.clip((left - right) / (2 * bend), -1.0, 1.0))
-    return float(ratios[i] + shift * (ratios[i + 1] - ratios[i])), float(
-        middle - (left - right) * shift / 4
-    )
-
-
 def _tilt_levels(tilts: Sequence[float]) -> tuple[Array, Array]:
     """Distinct |tilt| and their chances: isotropy depends on the cosine only."""
     levels, counts = np.unique(np.abs(np.asarray(tilts, dtype=np.float64)), return_counts=True)

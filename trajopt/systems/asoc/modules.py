@@ -190,47 +190,6 @@ def wheel_positions(geometry: AsocGeometry, alpha: ArrayLike) -> Array:
     return np.stack([axle - half * left, axle + half * left], -2)
 
 
-def wheel_frame(
-    geometry: AsocGeometry, module: int, wheel: int, alpha: float, beta: float, drop: float = 0.0
-) -> Array:
-    """(4, 4): frame 5_(n,m) of a wheel in the body frame 1, eqs. 12-16; ``module`` 0.., ``wheel`` 1
-    or 2.
-
-    ``drop`` (m): h, how far the axle hangs below the body frame. Corrected against the print: eq.
-    12 translates by (r cos, r sin, 0); alpha counts counter-clockwise; wheel 1 is on the right, as
-    eq. 18 needs.
-    """
-    if wheel not in (1, 2) or not 0 <= module < geometry.modules:
-        raise ArgumentError(
-            "wheel", (module, wheel), f"module 0..{geometry.modules - 1} and wheel 1 or 2"
-        )
-    zeta = float(geometry.angles[module])
-    joints = (
-        (0.0, zeta, geometry.module_radius, 0.0),  # Table VIII: d, angle, a, twist
-        (-drop, alpha - zeta - np.pi / 2, 0.0, np.pi / 2),
-        (geometry.offset, -beta, 0.0, 0.0),
-        (0.0, 0.0, geometry.split / 2 * (1 if wheel == 1 else -1), 0.0),
-    )
-    frame = np.eye(4)
-    for distance, angle, length, twist in joints:
-        frame = frame @ _joint(distance, angle, length, twist)
-    return frame
-
-
-def _joint(d: float, angle: float, a: float, twist: float) -> Array:
-    """Denavit-Hartenberg transformation: rotate about z, shift (a along the new x, d along z),
-    twist about x."""
-    c, s, ct, st = np.cos(angle), np.sin(angle), np.cos(twist), np.sin(twist)
-    return np.array(
-        [
-            [c, -s * ct, s * st, a * c],
-            [s, c * ct, -c * st, a * s],
-            [0.0, st, ct, d],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-
-
 def workspace_radius(geometry: AsocGeometry) -> float:
     """Radius of the circle that a module's wheels sweep, m (eq. 5)."""
     return float(
@@ -241,11 +200,6 @@ def workspace_radius(geometry: AsocGeometry) -> float:
 def envelope(offset: Any, split: Any, radius: Any, width: Any) -> Any:
     """Eq. 5 on numbers, arrays or symbols, m."""
     return np.sqrt((offset + radius) ** 2 + (0.5 * split + width) ** 2)
-
-
-def workspaces_clear(geometry: AsocGeometry) -> bool:
-    """Whether neighbouring modules can never touch: d_a >= 2 r (section 3.1.1)."""
-    return geometry.axis_distance >= 2 * workspace_radius(geometry)
 
 
 def largest_pivot(offset: Any, split: Any, radius: Any) -> Any:

@@ -9,17 +9,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, require_positive
-from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.arrays import Array
+from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
-from trajopt.systems.asoc.modules import AsocGeometry, largest_pivot, wheel_positions
 from trajopt.timing.scaling import time_scale
-from trajopt.world.height_map import HeightMap
-from trajopt.world.wheel_contact import wheel_contact
 
-SIDE = 4.5  # m, square of [udengaard2008], section 4.3
 SPEED = 1.5  # m/s, section 4.3
 PLANNED_ACCELERATION = 1.5  # m/s^2, a quarter of what friction 0.6 allows, chosen
 _SAMPLES = 0.01  # s between samples of a planned motion, chosen
@@ -55,29 +51,12 @@ class Reference:
         return np.asarray(np.min(np.linalg.norm(points[:, None] - foot, axis=-1), axis=1))
 
 
-def square_corners(side: float = SIDE) -> Array:
-    """(5, 2): corners of the square, counter-clockwise from the origin, m."""
-    return side * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
-
-
-def constant_speed(corners: ArrayLike, speed: float = SPEED) -> Reference:
-    """The thesis's command: one speed along every side, turned in no time at the corners."""
-    points = _checked(corners)
-    require_positive("speed", speed, "m/s")
-    sides = np.diff(points, axis=0)
-    length = np.linalg.norm(sides, axis=1)
-    times = np.concatenate([[0.0], np.cumsum(length / speed)])
-    return Reference(
-        times, points, np.vstack([sides / length[:, None] * speed, np.zeros(2)]), points
-    )
-
-
 def planned_speed(
     corners: ArrayLike, speed: float = SPEED, acceleration: float = PLANNED_ACCELERATION
 ) -> Reference:
     """The improvement: each side timed by ``time_scale`` under speed and acceleration limits, from
     rest to rest, since a sharp corner allows no speed."""
-    points = _checked(corners)
+    points = checked_corners(corners)
     limits = (Speed(speed), Acceleration(acceleration, acceleration))
     start, parts = 0.0, []
     for a, b in pairwise(points):
@@ -91,44 +70,7 @@ def planned_speed(
     return Reference(times, positions, velocities, points)
 
 
-def require_pivots(
-    geometry: AsocGeometry, ground: HeightMap, reference: Reference, *, every: float = 0.02
-) -> float:
-    """Largest tilt (rad) that the ground asks of a module along the path, body level, modules
-    trailing.
-
-    Raises InfeasibleError, with place (m along the path) and angle, where it is more than eq. 8
-    allows.
-    """
-    allowed = float(largest_pivot(geometry.offset, geometry.split, geometry.wheel_radius))
-    worst, done = 0.0, 0.0
-    for a, b in pairwise(reference.corners):
-        length, heading = float(np.linalg.norm(b - a)), float(np.arctan2(*(b - a)[::-1]))
-        s = np.linspace(0.0, length, int(length / every) + 2)
-        centres = a + s[:, None] * (b - a) / length
-        local = wheel_positions(geometry, np.full(geometry.modules, heading))
-        places = (local + centres[:, None, None]).reshape(-1, 2)
-        heights = wheel_contact(
-            ground, places[:, 0], places[:, 1], heading, geometry.wheel_radius
-        ).centre_height
-        tilt = np.abs(np.arctan(np.diff(heights.reshape(-1, 2), axis=1) / geometry.split)).reshape(
-            len(s), -1
-        )
-        i, module = np.unravel_index(int(np.argmax(tilt)), tilt.shape)
-        if tilt[i, module] > allowed:
-            x, y = places.reshape(len(s), -1, 2, 2)[i, module].mean(axis=0)
-            raise InfeasibleError(
-                "pivot",
-                done + float(s[i]),
-                f"module {module} at ({x:.3g}, {y:.3g}) m must tilt "
-                f"{np.degrees(tilt[i, module]):.3g} deg, the pivots allow "
-                f"{np.degrees(allowed):.3g} deg",
-            )
-        worst, done = max(worst, float(tilt[i, module])), done + length
-    return worst
-
-
-def _checked(corners: ArrayLike) -> Array:
+def checked_corners(corners: ArrayLike) -> Array:
     points = np.asarray(corners, dtype=np.float64)
     if (
         points.ndim != 2

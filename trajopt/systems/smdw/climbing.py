@@ -268,12 +268,6 @@ def collision_reach(
     return float(meeting(wheel, theta, motion, alpha, height).line)
 
 
-def lifting_torque(wheel: DoubleWheel, theta: Array, load: float) -> Array:
-    """Quasi-static torque (N m) that lifts ``load`` (N) with a hub on the step: load times contact
-    offset."""
-    return np.asarray(load * np.abs(contact_offset(wheel, theta)))
-
-
 def lift(wheel: DoubleWheel, theta: Array) -> Array:
     """Height (m) by which a hub standing on a step of Rc - Re lifts the axle, from wheel angle 0
     on."""

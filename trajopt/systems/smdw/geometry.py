@@ -30,8 +30,6 @@ from trajopt.errors import ArgumentError
 from trajopt.robots.description import WheelSection
 from trajopt.simulate.double import hub_support
 
-CLOUD_POINTS = 36_000  # points a contour; spacing 1.8e-5 m on a 0.1 m wheel
-
 
 @dataclass(frozen=True)
 class DoubleWheel:
@@ -116,8 +114,8 @@ def meet_step(wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: floa
 
     Raises ArgumentError for a height outside (0, Rc) or a yaw outside [-pi, 0].
     """
-    theta, yaw, nx, ny, facing_lifted, carrying, lifted = _roles(wheel, theta, yaw, height)
-    near, far = _faces(wheel, facing_lifted)
+    theta, yaw, nx, ny, facing_lifted, carrying, lifted = roles(wheel, theta, yaw, height)
+    near, far = faces(wheel, facing_lifted)
     line = (
         nx * _reach(wheel, carrying, height - wheel.radius, np.where(nx >= 0, 1.0, -1.0))
         + ny * near
@@ -140,68 +138,7 @@ def meet_step(wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: floa
     )
 
 
-def meet_step_cloud(
-    wheel: DoubleWheel, theta: float, yaw: float, height: float, points: int = CLOUD_POINTS
-) -> Meeting:
-    """The same from the point cloud Gamma(theta, alpha) (Eqns. 4.1-4.7), one wheel angle and yaw at
-    a time."""
-    _, _, nx, ny, facing_lifted, carrying, lifted = _roles(wheel, theta, yaw, height)
-    near, far = (float(v) for v in _faces(wheel, facing_lifted))
-    a, b = float(nx), float(ny)
-    level = height - wheel.radius
-    x, z = _turned(outline(wheel, points), float(carrying))
-    k = int(np.argmax(np.where(z <= level, a * x, -np.inf)))
-    foremost = float(x[k])
-    for j in (
-        (k - 1) % points,
-        (k + 1) % points,
-    ):  # farther where the contour crosses the step's height
-        if z[j] > level:
-            foremost = max(
-                foremost,
-                float(x[k] + (x[j] - x[k]) * (level - z[k]) / (z[j] - z[k])),
-                key=lambda v: a * v,
-            )
-    line = a * foremost + b * near
-    x, z = _turned(outline(wheel, points), float(lifted))
-    beyond = np.flatnonzero(a * x + b * far >= line)
-    zero = np.zeros(())
-    if beyond.size == 0:
-        return Meeting(np.array(False), np.array(np.inf), zero, zero, zero, np.array(line))
-    i = int(beyond[np.argmin(z[beyond])])
-    at_x, at_z, rise = float(x[i]), float(z[i]), 0.0
-    if i != int(
-        np.argmin(z)
-    ):  # cut off by the line: interpolate to it, along the edge that crosses it
-        j = next(
-            (k for k in ((i - 1) % points, (i + 1) % points) if a * x[k] + b * far < line),
-            (i + 1) % points,
-        )
-        rise = math.atan((z[j] - z[i]) / (x[j] - x[i])) * math.copysign(1.0, a)
-        at_x = (line - b * far) / a
-        at_z = float(z[i] + (z[j] - z[i]) * (at_x - x[i]) / (x[j] - x[i]))
-    return Meeting(
-        np.array(True),
-        np.array(wheel.radius + at_z),
-        np.array(at_x),
-        np.array(math.hypot(at_x, at_z)),
-        np.array(-max(rise, 0.0)),
-        np.array(line),
-    )
-
-
-def outline(wheel: DoubleWheel, points: int = CLOUD_POINTS) -> Array:
-    """(2, points): x and z (m) of one hub's contour, ellipse down (Eqns. 4.1, 4.2)."""
-    t = np.arange(points) * (2 * np.pi / points)
-    return np.stack(
-        [
-            wheel.radius * np.cos(t),
-            np.where(t < np.pi, wheel.radius, wheel.minor_radius) * np.sin(t),
-        ]
-    )
-
-
-def _roles(
+def roles(
     wheel: DoubleWheel, theta: ArrayLike, yaw: ArrayLike, height: float
 ) -> tuple[Array, Array, Array, Array, BoolArray, Array, Array]:
     """Broadcast angles, the step's normal in the wheel frame, and which hub carries, with both
@@ -227,7 +164,7 @@ def _roles(
     )
 
 
-def _faces(wheel: DoubleWheel, facing_lifted: BoolArray) -> tuple[Array, Array]:
+def faces(wheel: DoubleWheel, facing_lifted: BoolArray) -> tuple[Array, Array]:
     """y (m) of the face nearest to the step: of the carrying hub and of the lifted one."""
     outside, inside = wheel.gap / 2 + wheel.depth, -wheel.gap / 2
     return np.where(facing_lifted, inside, outside), np.where(facing_lifted, outside, inside)
@@ -270,9 +207,3 @@ def _quadric(wheel: DoubleWheel, angle: Array) -> tuple[Array, Array, Array]:
     s, c = np.sin(angle), np.cos(angle)
     a, b = 1 / wheel.radius**2, 1 / wheel.minor_radius**2
     return c * c * a + s * s * b, s * c * (b - a), s * s * a + c * c * b
-
-
-def _turned(points: Array, angle: float) -> tuple[Array, Array]:
-    """Contour points turned forward by ``angle`` about the axle."""
-    s, c = math.sin(angle), math.cos(angle)
-    return c * points[0] + s * points[1], -s * points[0] + c * points[1]
