@@ -36,7 +36,7 @@ def sample_time_study(
         orders = commands(trajectory, sample_time, rule=rule)
         t = np.arange(0.0, trajectory.duration, _FINE)
         i = np.clip((t / sample_time).astype(np.intp), 0, len(orders.times) - 1)
-        given = (orders.left[i] + orders.right[i]) / 2
+        given = orders.speeds[i].mean(axis=1)
         error = float(np.sqrt(np.mean((given - trajectory.at(t).twist[:, 0]) ** 2)))
         assert trajectory.robot is not None  # or commands had refused
         end = driven(orders, trajectory.robot, start, np.array([orders.duration]))[0]

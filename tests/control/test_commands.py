@@ -41,9 +41,8 @@ def test_mean_commands_end_at_the_planned_wheel_angles(plan: Trajectory) -> None
 def test_drive_of_a_circle_is_exact(plan: Trajectory) -> None:
     """Constant wheel speeds make a circle, whatever the sampling."""
     orders = commands(plan, 0.5)
-    circle = type(orders)(
-        orders.times, np.full(len(orders.times), 0.3), np.full(len(orders.times), 0.5), 0.5
-    )
+    speeds = np.tile([0.3, 0.5], (len(orders.times), 1))
+    circle = type(orders)(orders.times, speeds, orders.wheels, 0.5)
     t = np.linspace(0, circle.duration, 33)
     pose = driven(circle, shipped("powerbot"), (1.0, 2.0, 0.3), t)
     w, v = 0.2 / (2 * 0.268), 0.4
