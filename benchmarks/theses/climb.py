@@ -34,14 +34,13 @@ from trajopt.systems.smdw.climb import (
     reached,
     run_approach,
 )
-from trajopt.systems.smdw.planner import (
+from trajopt.systems.smdw.configurations import (
     Configuration,
-    Plan,
     approach_target,
     configurations_of,
-    plan_configuration,
     travel_to_step,
 )
+from trajopt.systems.smdw.planner import Plan, plan_configuration
 from trajopt.systems.smdw.thesis import through_drives
 from trajopt.systems.smdw.trials import (
     NEAREST,

@@ -25,8 +25,9 @@ from trajopt.problem import load_problem
 from trajopt.report.intervals import wilson
 from trajopt.simulate.sensors import Sensors
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
+from trajopt.systems.smdw.configurations import configurations_of
 from trajopt.systems.smdw.entry import free_ground
-from trajopt.systems.smdw.planner import Plan, configurations_of, plan_configuration
+from trajopt.systems.smdw.planner import Plan, plan_configuration
 from trajopt.systems.smdw.trials import four, step_scene
 
 FILES = ("step_5cm.toml", "step_3_5cm.toml")  # scenarios 1 and 2

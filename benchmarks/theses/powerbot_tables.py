@@ -18,7 +18,8 @@ import numpy as np
 from benchmarks.common import OUT, PROBLEMS, ROOT, ResultTable, publish
 from benchmarks.theses.powerbot_study import halving_plan, linear_factor, sample_time_study
 from trajopt.control.encounter import Visitor, course, safe_speed, visited_world
-from trajopt.control.replan import TIME_STEP, Run, Sensor, replan, run_encounter
+from trajopt.control.encounter_run import Run, run_encounter
+from trajopt.control.replan import TIME_STEP, Sensor, replan
 from trajopt.control.tracking import Tracker
 from trajopt.errors import TrajoptError
 from trajopt.limits.limit import Limit

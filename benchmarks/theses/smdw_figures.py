@@ -30,8 +30,9 @@ from trajopt.problem import load_problem
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.systems.smdw.climb import Climb, judge, reached, record_climb, run_approach
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, loc8_smdw
+from trajopt.systems.smdw.configurations import configurations_of
 from trajopt.systems.smdw.pictures import geometry_figure
-from trajopt.systems.smdw.planner import Plan, configurations_of
+from trajopt.systems.smdw.planner import Plan
 from trajopt.systems.smdw.trial_pictures import Motions, motions_figure
 from trajopt.systems.smdw.trials import approach_command, step_scene
 

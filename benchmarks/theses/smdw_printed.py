@@ -25,7 +25,7 @@ from trajopt.report.intervals import wilson
 from trajopt.robots.robot import robot
 from trajopt.simulate.engine import ENGINES, Recording
 from trajopt.systems.smdw.climb import Climb, Outcome, judge, record_climb
-from trajopt.systems.smdw.planner import Configuration, configurations_of
+from trajopt.systems.smdw.configurations import Configuration, configurations_of
 from trajopt.systems.smdw.trials import critical_wheels, four, step_scene
 
 DATA = Path(__file__).parent / "data" / "smdw"

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from trajopt.bench.comparison import BenchPlan, best_costs, load_bench, run_bench
+from trajopt.bench.comparison import BenchPlan, load_bench, run_bench
 from trajopt.bench.page import write_report
-from trajopt.bench.problems import bench_problem
+from trajopt.bench.problems import bench_problem, best_costs
 from trajopt.bench.profiles import (
     data_profile,
     ecdf,
@@ -256,7 +256,7 @@ def test_best_costs_take_known_and_found_values() -> None:
 def test_best_known_values_are_kept_with_who_found_them(tmp_path: Path) -> None:
     import json
 
-    from trajopt.bench.comparison import write_best_known
+    from trajopt.bench.problems import write_best_known
 
     plan = BenchPlan("best", ("random-smdw/7/p2/limits",), ("pso",), seeds=2, evaluations=300)
     store = run_bench(plan, tmp_path / "rows")

@@ -15,15 +15,8 @@ from trajopt.control.encounter import (
     safe_speed,
     visited_world,
 )
-from trajopt.control.replan import (
-    TIME_STEP,
-    Sensor,
-    SpeedPlan,
-    at_rest,
-    replan,
-    run_encounter,
-    stops_in_time,
-)
+from trajopt.control.encounter_run import run_encounter
+from trajopt.control.replan import TIME_STEP, Sensor, SpeedPlan, at_rest, replan, stops_in_time
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip

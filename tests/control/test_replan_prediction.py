@@ -8,15 +8,8 @@ import numpy as np
 import pytest
 
 from trajopt.control.encounter import Course, Obstacle, clearance, course, safe_speed
-from trajopt.control.replan import (
-    TIME_STEP,
-    Sensor,
-    SpeedPlan,
-    at_rest,
-    replan,
-    run_encounter,
-    stops_in_time,
-)
+from trajopt.control.encounter_run import run_encounter
+from trajopt.control.replan import TIME_STEP, Sensor, SpeedPlan, at_rest, replan, stops_in_time
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path

@@ -11,7 +11,8 @@ from matplotlib.image import imread
 from benchmarks.peers.timing_picture import draw_growth, growth_exponent
 from benchmarks.theses.powerbot_figures import draw_path, draw_profiles, draw_safe_speed
 from trajopt.control.encounter import Obstacle, course
-from trajopt.control.replan import Sensor, run_encounter
+from trajopt.control.encounter_run import run_encounter
+from trajopt.control.replan import Sensor
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed

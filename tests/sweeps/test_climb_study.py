@@ -10,7 +10,7 @@ from trajopt.sweeps.cases import Case
 from trajopt.sweeps.sweepfile import load_sweep
 from trajopt.systems.smdw import study as climb_study
 from trajopt.systems.smdw.climb import Climb, Outcome, run_climb
-from trajopt.systems.smdw.planner import configurations_of
+from trajopt.systems.smdw.configurations import configurations_of
 
 
 def test_a_trial_climbs_with_the_values_of_its_case(monkeypatch: pytest.MonkeyPatch) -> None:

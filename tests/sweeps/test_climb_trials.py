@@ -21,13 +21,9 @@ from trajopt.errors import ArgumentError
 from trajopt.problem import Problem, load_problem
 from trajopt.simulate.sensors import Sensors
 from trajopt.systems.smdw.approach_run import Ending
+from trajopt.systems.smdw.configurations import configurations_of, travel_to_step
 from trajopt.systems.smdw.entry import step_of
-from trajopt.systems.smdw.planner import (
-    Plan,
-    configurations_of,
-    plan_configuration,
-    travel_to_step,
-)
+from trajopt.systems.smdw.planner import Plan, plan_configuration
 from trajopt.systems.smdw.trials import (
     NEAREST,
     Scatter,

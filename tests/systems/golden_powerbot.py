@@ -10,7 +10,8 @@ import numpy as np
 from benchmarks.theses.powerbot_study import halving_plan, linear_factor
 from tests.systems.golden_data import ROOT, Figures, rows_of
 from trajopt.control.encounter import Visitor, course, safe_speed, visited_world
-from trajopt.control.replan import Sensor, replan, run_encounter
+from trajopt.control.encounter_run import run_encounter
+from trajopt.control.replan import Sensor, replan
 from trajopt.limits.slip import Slip
 from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path as RobotPath

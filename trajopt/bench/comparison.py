@@ -9,12 +9,11 @@ final candidate.
 
 from __future__ import annotations
 
-import datetime
 import json
 import time
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -22,15 +21,10 @@ from typing import Any
 import numpy as np
 
 from trajopt.bench.functions import more_wild_names
-from trajopt.bench.problems import (
-    BenchProblem,
-    bench_problem,
-    best_known,
-    objective_named,
-)
+from trajopt.bench.problems import BenchProblem, bench_problem, objective_named
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import FEASIBLE, Budget, Optimizer, OptimizeResult
-from trajopt.optimize.plugins import optimizers_of_file
+from trajopt.optimize.plugins import mapping_of_file
 from trajopt.optimize.search import minimize, optimizer_named
 from trajopt.provenance import processor
 from trajopt.sweeps.cases import Case
@@ -41,18 +35,6 @@ from trajopt.sweeps.sweeps import sweep
 TARGETS = tuple(
     10.0**-k for k in range(1, 10)
 )  # shares of reference - best still left; Moré and Wild's tau
-_KEYS = {
-    "title",
-    "problems",
-    "optimizers",
-    "seeds",
-    "evaluations",
-    "seconds",
-    "longer",
-    "time_limit",
-    "problem_root",
-    "plugins",
-}
 _SEEDS_IN_A_ROW = 5  # chosen
 _WARM = Budget(evaluations=60)  # a first search that loads and compiles, timed apart; chosen
 
@@ -119,17 +101,11 @@ def named_optimizer(name: str, plugins: Iterable[str] = ()) -> Optimizer:
     from trajopt.bench.peers import PEERS
 
     for file in plugins:
-        offered = optimizers_of_file(file) if _offers(file) else {}
+        offered = mapping_of_file(file, "OPTIMIZERS")
         if name in offered:
             made: Optimizer = offered[name]()
             return made
     return PEERS[name]() if name in PEERS else optimizer_named(name)
-
-
-def _offers(file: str) -> bool:
-    from trajopt.optimize.plugins import plugin
-
-    return hasattr(plugin(file), "OPTIMIZERS")
 
 
 def load_bench(path: str | Path, plugins: Iterable[str | Path] = ()) -> BenchPlan:
@@ -141,22 +117,17 @@ def load_bench(path: str | Path, plugins: Iterable[str | Path] = ()) -> BenchPla
         data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ArgumentError("bench file", str(path), f"a readable TOML file ({error})") from None
-    for key in data.keys() - _KEYS:
-        raise ArgumentError(
-            f"{path}: {key}", data[key], "one of the keys " + ", ".join(sorted(_KEYS))
-        )
+    known = sorted(f.name for f in fields(BenchPlan))
+    for key in data.keys() - set(known):
+        raise ArgumentError(f"{path}: {key}", data[key], "one of the keys " + ", ".join(known))
     for key in ("problems", "optimizers"):
-        if (
-            not isinstance(data.get(key), list)
-            or not data[key]
-            or not all(isinstance(v, str) for v in data[key])
-        ):
-            raise ArgumentError(f"{path}: {key}", data.get(key), "a list of names")
+        names = data.get(key)
+        if not isinstance(names, list) or not names or not all(isinstance(v, str) for v in names):
+            raise ArgumentError(f"{path}: {key}", names, "a list of names")
     for key in ("seeds", "evaluations", "seconds", "time_limit"):
-        if key in data and (
-            isinstance(data[key], bool) or not isinstance(data[key], (int, float)) or data[key] <= 0
-        ):
-            raise ArgumentError(f"{path}: {key}", data[key], "a number > 0")
+        value = data.get(key, 1)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or value <= 0:
+            raise ArgumentError(f"{path}: {key}", value, "a number > 0")
     longer = data.get("longer", {})
     if not isinstance(longer, dict) or not all(
         isinstance(v, (int, float)) and v > 0 for v in longer.values()
@@ -165,20 +136,14 @@ def load_bench(path: str | Path, plugins: Iterable[str | Path] = ()) -> BenchPla
             f"{path}: longer", longer, "seconds > 0 by the start of a problem's name"
         )
     files = [str(Path(p).resolve()) for p in (*data.pop("plugins", []), *plugins)]
-    asked = data.pop("problems")
-    problems = [
-        name for text in asked for name in (more_wild_names() if text == "more-wild/*" else [text])
-    ]
+    problems: list[str] = []
+    for name in data.pop("problems"):
+        problems += more_wild_names() if name == "more-wild/*" else [name]
     for file in files:
-        from trajopt.optimize.plugins import mapping_of_file
-
-        problems += [name for name in mapping_of_file(file, "PROBLEMS") if name not in problems]
-        data["optimizers"] += [
-            n for n in mapping_of_file(file, "OPTIMIZERS") if n not in data["optimizers"]
-        ]
-    title = str(data.pop("title", Path(path).stem))
+        problems += mapping_of_file(file, "PROBLEMS")
+        data["optimizers"] += mapping_of_file(file, "OPTIMIZERS")
     return BenchPlan(
-        title,
+        str(data.pop("title", Path(path).stem)),
         tuple(dict.fromkeys(problems)),
         tuple(dict.fromkeys(data.pop("optimizers"))),
         plugins=tuple(files),
@@ -202,13 +167,11 @@ class BenchRun:
         problem, method, construct = _built(
             name, str(case["optimizer"]), self.plugins, self.problem_root
         )
-        most = max(
-            (entry for entry in self.seconds if name.startswith(entry[0])),
-            key=lambda entry: len(entry[0]),
-        )[1]
-        found = _search(
-            problem, method, int(case["seed"]), Budget(self.evaluations, most, clock="cpu")
+        fitting = [entry for entry in self.seconds if name.startswith(entry[0])]
+        budget = Budget(
+            self.evaluations, max(fitting, key=lambda entry: len(entry[0]))[1], clock="cpu"
         )
+        found = _search(problem, method, int(case["seed"]), budget)
         return {
             "dimension": problem.objective.dimension,
             "cost": found.fun,
@@ -270,9 +233,8 @@ def _history(problem: BenchProblem, found: OptimizeResult) -> dict[str, Any]:
         cost = np.append(cost, found.fun)
     floor = problem.best if np.isfinite(problem.best) else (cost[-1] if len(cost) else 0.0)
     decade = np.floor(10 * np.log10(np.maximum(cost - floor, 1e-16)))
-    keep = (
-        np.append(decade[:-1] != decade[1:], True) if len(cost) else np.zeros(0, bool)
-    )  # last of each step
+    keep = np.ones(len(cost), bool)
+    keep[:-1] = decade[:-1] != decade[1:]  # last of each step
     keep[:1] = True
     return {
         "at_evaluations": evaluations[keep].tolist(),
@@ -311,59 +273,3 @@ def run_bench(
         ),
         progress=progress,
     )
-
-
-def best_costs(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, str]]:
-    """Best feasible cost of each problem: the known one, or what a row of this run found, and who
-    found it."""
-    best: dict[str, tuple[float, str]] = {}
-    for row in rows:
-        name = str(row["problem"])
-        if name not in best:
-            known = {
-                "cost": row.get("best"),
-                "found_by": row.get("found_by") or "best_known.json",
-                **best_known().get(name, {}),
-            }
-            told = known["cost"] is not None and np.isfinite(known["cost"])
-            best[name] = (float(known["cost"]), str(known["found_by"])) if told else (np.inf, "")
-        cost = row.get("cost")
-        if (
-            row["status"] == "done"
-            and row.get("feasible")
-            and cost is not None
-            and cost < best[name][0]
-        ):
-            best[name] = (float(cost), f"{row['optimizer']}, seed {row['seed']}")
-    return best
-
-
-def write_best_known(store: Store, file: str | Path) -> dict[str, dict[str, Any]]:
-    """Merge the best rows of a benchmark into ``file`` (best_known.json), where they are better;
-    what it then holds.
-
-    Each entry has the cost, who found it (optimizer, seed, commit, date) and the decision
-    variables.
-    """
-    place = Path(file)
-    known: dict[str, dict[str, Any]] = (
-        json.loads(place.read_text(encoding="utf-8")) if place.exists() else {}
-    )
-    last = store.runs()[-1]
-    day = datetime.datetime.fromtimestamp(float(last["started"]), datetime.UTC).date().isoformat()
-    where = f"commit {str(last.get('commit'))[:7]}, {day}"
-    for row in store.frame().to_dict("records"):
-        name, cost = str(row["problem"]), row.get("cost")
-        if row["status"] != "done" or not row["feasible"] or cost is None or not np.isfinite(cost):
-            continue
-        told = (
-            row["best"] if row.get("best") is not None and np.isfinite(row["best"]) else np.inf
-        )  # elsewhere
-        if cost < min(told, known.get(name, {}).get("cost", np.inf)):
-            known[name] = {
-                "cost": float(cost),
-                "found_by": f"{row['optimizer']}, seed {int(row['seed'])}, {where}",
-                "x": json.loads(row["x"]),
-            }
-    place.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n", encoding="utf-8")
-    return known

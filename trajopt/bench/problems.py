@@ -6,9 +6,10 @@ names of a plugin file's ``PROBLEMS`` come before.
 
 from __future__ import annotations
 
+import datetime
 import importlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
@@ -21,6 +22,7 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Objective
 from trajopt.optimize.plugins import mapping_of_file
+from trajopt.sweeps.store import Store
 
 MODULES = (  # each has FAMILIES: first word of a name -> Family; loaded when a problem is asked for
     "trajopt.systems.smdw.bench_problems",
@@ -134,3 +136,58 @@ def best_known() -> dict[str, dict[str, Any]]:
     text = (files("trajopt.bench") / "best_known.json").read_text(encoding="utf-8")
     found: dict[str, dict[str, Any]] = json.loads(text)
     return found
+
+
+def best_costs(rows: Iterable[Mapping[str, Any]]) -> dict[str, tuple[float, str]]:
+    """Best feasible cost of each problem: the known one, or what a row of this run found, and who
+    found it."""
+    best: dict[str, tuple[float, str]] = {}
+    for row in rows:
+        name = str(row["problem"])
+        if name not in best:
+            known = {
+                "cost": row.get("best"),
+                "found_by": row.get("found_by") or "best_known.json",
+                **best_known().get(name, {}),
+            }
+            told = known["cost"] is not None and np.isfinite(known["cost"])
+            best[name] = (float(known["cost"]), str(known["found_by"])) if told else (np.inf, "")
+        cost = row.get("cost")
+        if (
+            row["status"] == "done"
+            and row.get("feasible")
+            and cost is not None
+            and cost < best[name][0]
+        ):
+            best[name] = (float(cost), f"{row['optimizer']}, seed {row['seed']}")
+    return best
+
+
+def write_best_known(store: Store, file: str | Path) -> dict[str, dict[str, Any]]:
+    """Merge the best rows of a benchmark into ``file`` (best_known.json), where they are better;
+    what it then holds.
+
+    Each entry has the cost, who found it (optimizer, seed, commit, date) and the decision
+    variables.
+    """
+    place = Path(file)
+    known: dict[str, dict[str, Any]] = (
+        json.loads(place.read_text(encoding="utf-8")) if place.exists() else {}
+    )
+    last = store.runs()[-1]
+    day = datetime.datetime.fromtimestamp(float(last["started"]), datetime.UTC).date().isoformat()
+    where = f"commit {str(last.get('commit'))[:7]}, {day}"
+    for row in store.frame().to_dict("records"):
+        name, cost = str(row["problem"]), row.get("cost")
+        if row["status"] != "done" or not row["feasible"] or cost is None or not np.isfinite(cost):
+            continue
+        elsewhere = row.get("best")
+        told = elsewhere if elsewhere is not None and np.isfinite(elsewhere) else np.inf
+        if cost < min(told, known.get(name, {}).get("cost", np.inf)):
+            known[name] = {
+                "cost": float(cost),
+                "found_by": f"{row['optimizer']}, seed {int(row['seed'])}, {where}",
+                "x": json.loads(row["x"]),
+            }
+    place.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n", encoding="utf-8")
+    return known

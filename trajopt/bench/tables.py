@@ -12,8 +12,8 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.bench.comparison import TARGETS, best_costs
-from trajopt.bench.problems import families
+from trajopt.bench.comparison import TARGETS
+from trajopt.bench.problems import best_costs, families
 from trajopt.bench.profiles import RunningTime, expected_running_time, no_worse, time_to_targets
 from trajopt.errors import ArgumentError
 

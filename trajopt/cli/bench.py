@@ -113,7 +113,7 @@ def best(
     file: Annotated[Path, typer.Option("--file", help="JSON file to merge into")] = BEST_KNOWN,
 ) -> None:
     """Keep the best costs of a benchmark, with who found them, in the file of best known values."""
-    from trajopt.bench.comparison import write_best_known
+    from trajopt.bench.problems import write_best_known
     from trajopt.sweeps.store import open_store
 
     known = write_best_known(open_store(store, create=False), file)

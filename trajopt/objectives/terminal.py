@@ -20,51 +20,24 @@ from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
 from trajopt.objectives.exact import exact_terminal
 from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
-from trajopt.paths.path import Path
-from trajopt.paths.spline import SplineBasis, uniform_basis
+from trajopt.objectives.variables import TerminalVariables
 from trajopt.problem import Problem
 from trajopt.robots.actuator import Actuator
-from trajopt.robots.robot import Robot
 
 SEARCH_STEPS = 252  # 84 steps a spline segment, 14 to 20 ms on the problems at hand; chosen
 COARSE_STEPS = 84  # steps for Newton steps, chosen
-HEADING_MARGIN = (
-    np.pi / 2
-)  # rad beyond start and goal heading for free heading control points, chosen
-DURATION_RANGE = (0.25, 4.0)  # times the nominal duration, for a free duration, chosen
 
 
 @dataclass(frozen=True)
-class ControlPoints:
-    """Control values of n candidates in columns: x, y, yaw (4, n) and duration (1, n) in s."""
+class TerminalObjective(TerminalVariables):
+    """Table 4.4 over the free control values of ``problem``."""
 
-    x: Any
-    y: Any
-    yaw: Any
-    duration: Any
-
-
-@dataclass(frozen=True)
-class TerminalObjective:
-    """Table 4.4 over the free control values of ``problem``.
-
-    Decision variables, in this order where free: x1, y1 (p1), x2, y2 (p2), yaw1, yaw2 (heading),
-    duration.
-    """
-
-    problem: Problem
-    robot: Robot
     steps: int = SEARCH_STEPS
     kinematics: Kinematics | None = None  # None: the robot's own; given only to compare conventions
 
     def __post_init__(self) -> None:
-        step_grid(
-            self.basis, self.steps
-        )  # raises for steps that do not fit, even where no grid is used later
-
-    @property
-    def basis(self) -> SplineBasis:
-        return uniform_basis(4)
+        # raises for steps that do not fit, even where no grid is used later
+        step_grid(self.basis, self.steps)
 
     @cached_property
     def model(self) -> Kinematics:
@@ -74,11 +47,6 @@ class TerminalObjective:
     def actuator(self) -> Actuator:
         section = self.problem.actuator
         return Actuator() if section is None else section.drive
-
-    @property
-    def nominal_duration(self) -> float:
-        """s; drives that follow end at the same angles whatever it is."""
-        return 1.0 if self.problem.actuator is None else self.problem.actuator.duration
 
     @property
     def is_affine(self) -> bool:
@@ -97,100 +65,7 @@ class TerminalObjective:
     def constrained(self) -> bool:
         return False
 
-    # -- decision variables
-    # ---------------------------------------------------------------------------
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the decision variables with their units."""
-        parts = {
-            "p1": ("p1.x_m", "p1.y_m"),
-            "p2": ("p2.x_m", "p2.y_m"),
-            "heading": ("p1.yaw_rad", "p2.yaw_rad"),
-            "duration": ("duration_s",),
-        }
-        return tuple(
-            name for key in parts if key in self.problem.search.free for name in parts[key]
-        )
-
-    @property
-    def dimension(self) -> int:
-        return len(self.names)
-
-    @cached_property
-    def bounds(self) -> Array:
-        """(d, 2): the navigation space for points; margins around start and goal for heading;
-        duration."""
-        p = self.problem.search
-        yaws = (p.start[2], p.goal[2])
-        heading = (min(yaws) - HEADING_MARGIN, max(yaws) + HEADING_MARGIN)
-        by_suffix = {
-            "x_m": p.space.x,
-            "y_m": p.space.y,
-            "yaw_rad": heading,
-            "duration_s": tuple(f * self.nominal_duration for f in DURATION_RANGE),
-        }
-        return np.array([by_suffix[name.split(".")[-1]] for name in self.names], dtype=np.float64)
-
-    @cached_property
-    def default(self) -> Array:
-        """(d,): the thesis's P1 (Table 5.4, kept inside the space), P2 on the far third, linear
-        heading."""
-        p1, p2, yaw = self._fixed_points
-        values = {
-            "p1.x_m": p1[0],
-            "p1.y_m": p1[1],
-            "p2.x_m": p2[0],
-            "p2.y_m": p2[1],
-            "p1.yaw_rad": yaw[0],
-            "p2.yaw_rad": yaw[1],
-            "duration_s": self.nominal_duration,
-        }
-        return np.clip([values[name] for name in self.names], self.bounds[:, 0], self.bounds[:, 1])
-
-    @property
-    def _fixed_points(self) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
-        (x0, y0, a0), (xf, yf, af) = self.problem.search.start, self.problem.search.goal
-        p1 = (x0 + (xf - x0) / 2.5, y0 + (yf - y0) / 3)  # Table 5.4 with x_min = x_0, x_max = x_f
-        p2 = (x0 + (xf - x0) * 2 / 3, y0 + (yf - y0) * 2 / 3)
-        return p1, p2, (a0 + (af - a0) / 3, a0 + (af - a0) * 2 / 3)
-
-    def control_points(self, z: Any) -> ControlPoints:
-        """Control values from decision variables ``z`` (d, n): arrays or symbols, candidates in
-        columns."""
-        free, column = self.problem.search.free, 0 * z[0:1]
-        rows = dict(zip(self.names, (z[i : i + 1] for i in range(self.dimension)), strict=True))
-        (x0, y0, a0), (xf, yf, af) = self.problem.search.start, self.problem.search.goal
-        p1, p2, yaw = self._fixed_points
-        x1, y1 = (
-            (rows["p1.x_m"], rows["p1.y_m"]) if "p1" in free else (column + p1[0], column + p1[1])
-        )
-        x2, y2 = (
-            (rows["p2.x_m"], rows["p2.y_m"]) if "p2" in free else (column + p2[0], column + p2[1])
-        )
-        a1, a2 = column + yaw[0], column + yaw[1]
-        if "heading" in free:
-            a1, a2 = rows["p1.yaw_rad"], rows["p2.yaw_rad"]
-        duration = rows["duration_s"] if "duration" in free else column + self.nominal_duration
-        return ControlPoints(
-            np.vstack([column + x0, x1, x2, column + xf]),
-            np.vstack([column + y0, y1, y2, column + yf]),
-            np.vstack([column + a0, a1, a2, column + af]),
-            duration,
-        )
-
-    def path(self, candidate: Array) -> Path:
-        """The path through the control points of one candidate (d,)."""
-        points = self.control_points(np.asarray(candidate, dtype=np.float64)[:, None])
-        return Path(
-            self.basis,
-            np.column_stack([points.x[:, 0], points.y[:, 0]]),
-            points.yaw[:, 0],
-            self.robot.turning_length,
-        )
-
-    # -- cost
-    # -----------------------------------------------------------------------------------------
+    # -- cost --------------------------------------------------------------------------------------
 
     def predict(self, z: Any) -> Terminal:
         """Final state on the search grid, for decision variables (d, n), arrays or symbols;
@@ -212,15 +87,7 @@ class TerminalObjective:
     def predict_exactly(self, candidate: Array) -> Terminal:
         """Final state of one candidate (d,), free of grid error."""
         points = self.control_points(np.asarray(candidate, dtype=np.float64)[:, None])
-        return exact_terminal(
-            self.basis,
-            self.model,
-            self.actuator,
-            points.x[:, 0],
-            points.y[:, 0],
-            points.yaw[:, 0],
-            float(points.duration[0, 0]),
-        )
+        return exact_terminal(self.basis, self.model, self.actuator, *points.first)
 
     def wheel_errors(self, final: Terminal) -> list[Any]:
         """Critical wheel angle minus wanted angle, unfolded, rad, one entry a critical wheel."""
@@ -236,12 +103,8 @@ class TerminalObjective:
     def named_terms(self, final: Terminal) -> dict[str, Any]:
         """The terms of Table 4.4 by name; they sum to the cost."""
         section = self.problem.objective
-        terms = {
-            name: gain * np.abs(error)
-            for name, gain, error in zip(
-                ("x", "y", "yaw"), section.pose_gains, self.pose_errors(final), strict=True
-            )
-        }
+        pose = zip(("x", "y", "yaw"), section.pose_gains, self.pose_errors(final), strict=True)
+        terms = {name: gain * np.abs(error) for name, gain, error in pose}
         for name, error in zip(self.problem.critical, self.wheel_errors(final), strict=True):
             terms[f"wheel {name}"] = section.wheel_gain * np.abs(fold(error, section.period))
         return terms
@@ -262,7 +125,6 @@ class TerminalObjective:
             return None
         from trajopt.objectives import heading_swarm, swarm
 
-        points = self.control_points(self.default[:, None])
         heading = ("p1.yaw_rad", "p2.yaw_rad") if "heading" in self.problem.search.free else ()
         rows = [
             self.names.index(name) if name in self.names else -1
@@ -273,10 +135,7 @@ class TerminalObjective:
             step_grid(self.basis, self.steps),
             self.model,
             self.actuator,
-            points.x[:, 0],
-            points.y[:, 0],
-            points.yaw[:, 0],
-            float(points.duration[0, 0]),
+            *self.control_points(self.default[:, None]).first,
             np.array(rows),
         )
         section, task = self.problem.objective, self.problem.search
@@ -292,9 +151,8 @@ class TerminalObjective:
         if self.is_affine:
             matrix, offset = self._affine_errors
             section = self.problem.objective
-            cost = section.wheel_gain * np.abs(
-                fold(candidates @ matrix.T + offset, section.period)
-            ).sum(axis=1)
+            deviation = fold(candidates @ matrix.T + offset, section.period)
+            cost = section.wheel_gain * np.abs(deviation).sum(axis=1)
             return Evaluation(cost, np.zeros(len(candidates)))
         if self._compiled is not None and self._compiled[0].fits(candidates):
             plan, goal = self._compiled
@@ -310,16 +168,13 @@ class TerminalObjective:
 
     def terms(self, candidate: Array) -> dict[str, float]:
         """Named cost terms of one candidate (d,), without grid error."""
-        return {
-            k: float(np.squeeze(v))
-            for k, v in self.named_terms(self.predict_exactly(candidate)).items()
-        }
+        named = self.named_terms(self.predict_exactly(candidate))
+        return {name: float(np.squeeze(value)) for name, value in named.items()}
 
     def score(self, candidate: Array) -> Evaluation:
         return Evaluation(np.array([sum(self.terms(candidate).values())]), np.zeros(1))
 
-    # -- residuals
-    # ------------------------------------------------------------------------------------
+    # -- residuals ---------------------------------------------------------------------------------
 
     def nearest_turns(self, candidates: Array) -> Array:
         """(n, c): for each critical wheel, the whole number of periods nearest to the predicted
@@ -396,7 +251,7 @@ class TerminalObjective:
 
     def gradient(self, candidate: Array) -> Array:
         """(d,): gradient of the cost where affine (a subgradient at its kinks)."""
-        matrix, offset = self.affine()
+        matrix, offset = self._affine_errors
         deviation = fold(matrix @ candidate + offset, self.problem.objective.period)
         return np.asarray(self.problem.objective.wheel_gain * np.sign(deviation) @ matrix)
 
@@ -429,14 +284,10 @@ class TerminalObjective:
         cost: Any = 0.0
         for gain, value in zip(self.residual_gains().tolist(), slack, strict=True):
             cost = cost + gain * value
-        rows = [
-            row
-            for value, error in zip(slack, r, strict=True)
-            for row in (value - error, value + error)
-        ]
-        return SymbolicProblem(
-            cost, np.vstack(rows), np.zeros(len(rows)), np.full(len(rows), np.inf)
-        )
+        pairs = zip(slack, r, strict=True)
+        rows = [row for value, error in pairs for row in (value - error, value + error)]
+        count = len(rows)
+        return SymbolicProblem(cost, np.vstack(rows), np.zeros(count), np.full(count, np.inf))
 
     def parameters_at(self, start: Array) -> Array:
         return np.asarray(self.nearest_turns(start[None])[0])

@@ -38,9 +38,8 @@ _ATTEMPTS = ((False, 2), (True, 3))
 _PARTS = 3  # an interval is split into; chosen
 _SPLIT_ABOVE = 1e-3  # relative violation that splits an interval, or puts a row in; chosen
 _NEAR = 0.4  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
-_TIGHTER = (
-    1e-3  # share by which rows are tightened at the nodes, for what happens between them; chosen
-)
+# Share by which rows are tightened at the nodes, for what happens between them; chosen.
+_TIGHTER = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +79,21 @@ class SmoothMotion:
     def margins(self) -> dict[str, float]:
         """Least relative margin of every limit, and of the jerk's own bound, at ten points a node
         interval."""
-        s, v, a, _ = self.along(_between(self.times))
-        rows = _rows(self.source, self.source.limits, np.clip(s, 0.0, self.source.path.length))
-        return _margins(rows, v, a)
+        rows, v, a = self.checked()
+        slack = rows.c - rows.a * a[:, None] - rows.b * (v**2)[:, None]
+        found = {}
+        for k, name in enumerate(rows.names):
+            mine = slack[:, rows.row_owner == k]
+            speed = 1 - np.sqrt(v**2 / rows.bounds[k])
+            found[name] = float(min(mine.min(initial=np.inf), speed.min()))
+        return found
+
+    def checked(self) -> tuple[Stages, Array, Array]:
+        """Rows, speeds and accelerations at ``_FINE`` times in every node interval, and the
+        last."""
+        inside = self.times[:-1, None] + np.diff(self.times)[:, None] * (np.arange(_FINE) / _FINE)
+        s, v, a, _ = self.along(np.append(inside.ravel(), self.times[-1]))
+        return _rows(self.source, np.clip(s, 0.0, self.source.path.length)), v, a
 
 
 def limit_jerk(
@@ -116,11 +127,8 @@ def limit_jerk(
     best: SmoothMotion | None = None
     failure: InfeasibleError | None = None
     for strict, rounds in _ATTEMPTS:
-        shares, put_in, guess = (
-            np.full(nodes, 1 / nodes),
-            _near(source),
-            _first_guess(trajectory, jerk, nodes),
-        )
+        shares, put_in = np.full(nodes, 1 / nodes), _near(source)
+        guess = _first_guess(trajectory, jerk, nodes)
         for _ in range(rounds):
             if best is not None and best.slowdown <= _WANTED_SLOWDOWN:
                 return best
@@ -149,7 +157,7 @@ def limit_jerk(
 
 def _near(source: Trajectory) -> BoolArray:
     """(R,): which rows the time-optimal motion comes near to."""
-    rows = _rows(source, source.limits, source.s)
+    rows = _rows(source, source.s)
     sdd = np.append(source.sdd, source.sdd[-1])
     used = rows.a * sdd[:, None] + rows.b * source.sd[:, None] ** 2
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -185,21 +193,14 @@ def _solve(
     ``put_in`` (R,)."""
     length, top = source.path.length, float(source.sd.max())
     grid = np.linspace(0.0, length, TABLE_POINTS)
-    rows = _rows(source, source.limits, grid)
+    rows = _rows(source, grid)
     use = 1 / np.minimum(rows.sd2_max, (_SPEED_CAP * top) ** 2)
     width, n = int(put_in.sum()), len(shares)
     values = np.column_stack([rows.a[:, put_in], rows.b[:, put_in], rows.c[:, put_in], use])
     if strict:
-        values = _without_ringing(
-            np.column_stack(
-                [
-                    values[:, :width],
-                    _strictest(values[:, width : 2 * width]),
-                    -_strictest(-values[:, 2 * width : 3 * width]),
-                    _strictest(use[:, None]),
-                ]
-            )
-        )
+        a, b, c, cap = np.split(values, [width, 2 * width, 3 * width], axis=1)
+        held = [a, _strictest(b), -_strictest(-c), _strictest(cap)]
+        values = _without_ringing(np.column_stack(held))
     table = smooth_table(grid, values)
     x = variables(3 * (n + 1) + n + 1)
     s, v, a = (x[k * (n + 1) : (k + 1) * (n + 1)] for k in range(3))
@@ -228,15 +229,8 @@ def _solve(
     upper = np.concatenate(
         [np.full(n + 1, length), np.full(2 * (n + 1), np.inf), np.full(n, jerk), [10 * start[-1]]]
     )
-    for k, value in (
-        (0, 0.0),
-        (n, length),
-        (n + 1, 0.0),
-        (2 * n + 1, 0.0),
-        (2 * n + 2, 0.0),
-        (3 * n + 2, 0.0),
-    ):
-        lower[k] = upper[k] = value
+    ends = [0, n, n + 1, 2 * n + 1, 2 * n + 2, 3 * n + 2]  # of s, v, a: from rest to rest
+    lower[ends] = upper[ends] = [0.0, length, 0.0, 0.0, 0.0, 0.0]
     result = solve_program(
         x,
         total,
@@ -255,11 +249,9 @@ def _solve(
             f"IPOPT found no motion with at most {jerk:g} m/s^3 "
             f"({result.status}); take more nodes or a larger jerk",
         )
-    parts = np.split(result.x, [n + 1, 2 * n + 2, 3 * n + 3, 4 * n + 3])
-    times = np.concatenate([[0.0], np.cumsum(shares)]) * float(parts[4][0])
-    return SmoothMotion(
-        source, times, parts[0], parts[1], parts[2], parts[3], 1.0, result.iterations
-    )
+    s, v, a, j, total = np.split(result.x, [n + 1, 2 * n + 2, 3 * n + 3, 4 * n + 3])
+    times = np.concatenate([[0.0], np.cumsum(shares)]) * float(total[0])
+    return SmoothMotion(source, times, s, v, a, j, 1.0, result.iterations)
 
 
 def _strictest(values: Array) -> Array:
@@ -294,25 +286,14 @@ def _first_guess(trajectory: Trajectory, jerk: float, n: int) -> Array:
     )
 
 
-def _rows(trajectory: Trajectory, limits: tuple[Limit, ...], s: Array) -> Stages:
-    return assemble(sample_path(trajectory.path, s), limits, trajectory.robot)
-
-
-def _margins(rows: Stages, v: Array, a: Array) -> dict[str, float]:
-    slack = rows.c - rows.a * a[:, None] - rows.b * (v**2)[:, None]
-    found = {}
-    for k, name in enumerate(rows.names):
-        mine = slack[:, rows.row_owner == k]
-        speed = 1 - np.sqrt(v**2 / rows.bounds[k])
-        found[name] = float(min(mine.min(initial=np.inf), speed.min()))
-    return found
+def _rows(trajectory: Trajectory, s: Array) -> Stages:
+    return assemble(sample_path(trajectory.path, s), trajectory.limits, trajectory.robot)
 
 
 def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, BoolArray]:
     """Slowed uniformly until every row holds on the fine grid (rest is feasible, so a factor
     exists); how far each interval (N,) was broken before; which rows (R,) were."""
-    s, v, a, _ = motion.along(_between(motion.times))
-    rows = _rows(motion.source, motion.source.limits, np.clip(s, 0.0, motion.source.path.length))
+    rows, v, a = motion.checked()
     used = rows.a * a[:, None] + rows.b * (v**2)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         needed = np.where(rows.c > 0, used / rows.c, 1.0)
@@ -331,9 +312,3 @@ def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, BoolArray]:
         motion.iterations,
     )
     return slowed, excess, np.asarray((needed > 1 + _SPLIT_ABOVE).any(axis=0))
-
-
-def _between(times: Array) -> Array:
-    """``_FINE`` times in every interval, and the last."""
-    inside = times[:-1, None] + np.diff(times)[:, None] * (np.arange(_FINE) / _FINE)
-    return np.append(inside.ravel(), times[-1])

@@ -25,8 +25,8 @@ from trajopt.report.style import (
 )
 from trajopt.robots.description import WheelSection
 from trajopt.robots.mobility import mobility_of, rotation_centre
-from trajopt.robots.robot import Robot, kinematic
-from trajopt.robots.wheel import Wheel, WheelKind
+from trajopt.robots.robot import Robot
+from trajopt.robots.wheel import Wheel, WheelKind, kinematic
 
 _NEAREST_INFINITY = (
     5.0  # centres further away than this many footprint radii are drawn as a direction, chosen

@@ -18,8 +18,8 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.robots.robot import Robot, null_space, wheel_rates
-from trajopt.robots.wheel import Row, Wheel, WheelKind
+from trajopt.robots.robot import Robot
+from trajopt.robots.wheel import Row, Wheel, WheelKind, null_space, wheel_rates
 
 _TURNS = (WheelKind.STEERED, WheelKind.CASTOR)
 _SLIDE = (WheelKind.FIXED, WheelKind.STEERED)  # whose sliding rows forbid motions

@@ -20,13 +20,20 @@ CasADi expressions.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
 import numpy as np
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
+from trajopt.robots.description import WheelSection
+
+_RANK = 1e-9  # singular values below this share of the largest count as zero
+
+_AROUND = 48  # directions of a wheel that turns, for the outline; a multiple of 4
 
 
 class WheelKind(Enum):
@@ -141,3 +148,53 @@ class Wheel:
             roll.yaw - share * slide.yaw,
             roll.spin,
         )
+
+
+def wheel_rates(rows: list[Row]) -> Array:
+    """(W, 3): wheel rates (rad/s) that rolling rows give to each component of the body twist."""
+    matrix = np.array([[r.x / r.spin, r.y / r.spin, r.yaw / r.spin] for r in rows]).reshape(-1, 3)
+    matrix[np.abs(matrix) < 1e-12 * np.abs(matrix).max(initial=0.0)] = 0.0
+    return np.asarray(matrix, dtype=np.float64)
+
+
+def null_space(rows: Array) -> Array:
+    """(3, m): orthonormal basis of the body twists that no row (R, 3) forbids."""
+    if len(rows) == 0:
+        return np.eye(3)
+    _, singular, vt = np.linalg.svd(np.asarray(rows, dtype=np.float64))
+    return np.asarray(vt[int(np.sum(singular > _RANK * singular.max())) :].T, dtype=np.float64)
+
+
+def kinematic(wheel: WheelSection) -> Wheel:
+    """Rolling and sliding rows of a described wheel at steering angle 0."""
+    x, y = wheel.position
+    alpha = math.atan2(y, x)
+    return Wheel(
+        WheelKind(wheel.kind),
+        math.hypot(x, y),
+        alpha,
+        wheel.angle + math.pi / 2 - alpha,
+        wheel.radius,
+        gamma=wheel.rollers.angle if wheel.rollers else 0.0,
+        offset=-wheel.trail,
+        lateral=wheel.lateral,
+    )
+
+
+def outline(wheel: WheelSection, turns: tuple[float, float] | None) -> Array:
+    """(K, 2): places that a wheel reaches seen from above, m. A steered wheel ``turns`` from, to
+    (rad); without, it turns all round as a castor does."""
+    x, y = wheel.position
+    if wheel.kind in ("steered", "castor") and turns is None:
+        reach = math.hypot(wheel.trail + wheel.radius, abs(wheel.lateral) + wheel.width / 2)
+        around = 2 * np.pi / _AROUND * np.arange(_AROUND)
+        return np.column_stack([x + reach * np.cos(around), y + reach * np.sin(around)])
+    low, high = (0.0, 0.0) if turns is None else turns
+    angle = wheel.angle + np.linspace(low, high, _AROUND)[:, None]
+    ahead = np.array([1, 1, -1, -1]) * wheel.radius
+    left = np.array([1, -1, 1, -1]) * wheel.width / 2
+    corners = [
+        x + ahead * np.cos(angle) - left * np.sin(angle),
+        y + ahead * np.sin(angle) + left * np.cos(angle),
+    ]
+    return np.stack(corners, axis=-1).reshape(-1, 2)

@@ -15,8 +15,9 @@ from trajopt.errors import ArgumentError
 from trajopt.paths.path import Path as RobotPath
 from trajopt.problem import load_problem
 from trajopt.systems.smdw.climbing import loc8_smdw
+from trajopt.systems.smdw.configurations import configurations_of
 from trajopt.systems.smdw.entry import WHEELS, free_ground
-from trajopt.systems.smdw.planner import Plan, configurations_of, plan_configuration
+from trajopt.systems.smdw.planner import Plan, plan_configuration
 from trajopt.timing.scaling import time_scale
 
 FILE = Path(__file__).parents[3] / "problems" / "smdw" / "step_5cm.toml"

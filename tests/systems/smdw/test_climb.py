@@ -23,8 +23,9 @@ from trajopt.systems.smdw.climb import (
     rate,
     run_climb,
 )
+from trajopt.systems.smdw.configurations import configurations_of
 from trajopt.systems.smdw.entry import WHEELS
-from trajopt.systems.smdw.planner import Plan, configurations_of, plan_configuration
+from trajopt.systems.smdw.planner import Plan, plan_configuration
 from trajopt.systems.smdw.trials import step_scene
 from trajopt.world.obstacles import Step
 

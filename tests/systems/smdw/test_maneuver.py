@@ -15,18 +15,14 @@ from trajopt.optimize.search import minimize
 from trajopt.pipeline import solve
 from trajopt.problem import Problem, load_problem
 from trajopt.systems.smdw.climbing import Motion, collision_reach
-from trajopt.systems.smdw.entry import WHEELS, free_ground, step_of
-from trajopt.systems.smdw.planner import (
-    Maneuver,
-    Plan,
-    Refused,
+from trajopt.systems.smdw.configurations import (
     approach_target,
     configurations,
     configurations_of,
-    plan_climb,
-    plan_configuration,
     wheel_of,
 )
+from trajopt.systems.smdw.entry import WHEELS, free_ground, step_of
+from trajopt.systems.smdw.planner import Maneuver, Plan, Refused, plan_climb, plan_configuration
 from trajopt.world.free_ground import FreeGround, path_margin
 
 PROBLEMS = Path(__file__).parents[3] / "problems" / "smdw"

@@ -14,8 +14,9 @@ import numpy as np
 
 from trajopt.arrays import Array, fold
 from trajopt.control.encounter import Course, Obstacle, Visitor, visited_world
+from trajopt.control.encounter_run import Planner, Run, run_encounter
 from trajopt.control.measured import Targets
-from trajopt.control.replan import TIME_STEP, Planner, Run, Sensor, SpeedPlan, replan, run_encounter
+from trajopt.control.replan import TIME_STEP, Sensor, SpeedPlan, replan
 from trajopt.control.tracking import Tracker, require_turning
 from trajopt.errors import SimulationError
 from trajopt.robots.robot import Robot

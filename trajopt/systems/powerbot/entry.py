@@ -15,7 +15,8 @@ import numpy as np
 from pydantic import Field
 
 from trajopt.control.encounter import Course, Visitor, course, visited_world
-from trajopt.control.replan import TIME_STEP, Run, Sensor, run_encounter
+from trajopt.control.encounter_run import Run, run_encounter
+from trajopt.control.replan import TIME_STEP, Sensor
 from trajopt.limits.limit import Limit
 from trajopt.paths.samples import sample_path
 from trajopt.schema import NonNegative, Positive, Section, broken_rule

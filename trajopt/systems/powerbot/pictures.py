@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from trajopt.control.encounter import Course
-from trajopt.control.replan import Run
+from trajopt.control.encounter_run import Run
 from trajopt.report.style import (
     BLUE,
     GREEN,

@@ -30,9 +30,10 @@ from trajopt.systems.smdw.climbing import (
     THESIS_FORWARD_ALPHA,
     forward_alphas,
 )
+from trajopt.systems.smdw.configurations import wheel_of
 from trajopt.systems.smdw.entry import step_of
 from trajopt.systems.smdw.geometry import DoubleWheel, meet_step
-from trajopt.systems.smdw.planner import Maneuver, Plan, wheel_of
+from trajopt.systems.smdw.planner import Maneuver, Plan
 
 _OUTLINES = 7  # robot outlines drawn along a path
 

@@ -15,7 +15,7 @@ from trajopt.errors import ArgumentError
 from trajopt.problem import Problem
 from trajopt.sweeps.cases import Case
 from trajopt.systems.smdw.climb import Climb, run_climb
-from trajopt.systems.smdw.planner import approach_target, configurations_of, travel_to_step
+from trajopt.systems.smdw.configurations import approach_target, configurations_of, travel_to_step
 from trajopt.systems.smdw.trials import before_step, critical_wheels, four, step_scene
 
 POSITION_SD = 0.003  # m, of the state a climb starts from; chosen

@@ -37,8 +37,9 @@ from trajopt.systems.smdw.climb import (
     record_climb,
     run_approach,
 )
+from trajopt.systems.smdw.configurations import Configuration, travel_to_step
 from trajopt.systems.smdw.entry import WHEELS, free_ground, start_pose, step_of
-from trajopt.systems.smdw.planner import Configuration, Plan, travel_to_step
+from trajopt.systems.smdw.planner import Plan
 
 NEAREST = 0.004  # m, least gap to the step that a climb starts with; chosen
 
