@@ -1,0 +1,36 @@
+"""What README shows runs as it stands."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+from test_robots_page import written
+
+from trajopt import load_problem, solve
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_problem_is_solved_and_its_door_acts(tmp_path: Path) -> None:
+    written(tmp_path)[0].rename(tmp_path / "my_robot.toml")
+    (text,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    file = tmp_path / "door.toml"
+    file.write_text(text, encoding="utf-8")
+    assert solve(load_problem(file)).holds
+    nearer = load_problem(file, {"obstacles.door.start": [4.2, 0], "obstacles.door.end": [4.2, 2]})
+    assert any("door" in fault for fault in solve(nearer).faults)
+
+
+def test_the_python_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    before = Path.cwd()
+    os.chdir(ROOT)
+    try:
+        exec(compile(code, "README.md", "exec"), {})
+    finally:
+        os.chdir(before)
+    assert len(capsys.readouterr().out.splitlines()) == 3
