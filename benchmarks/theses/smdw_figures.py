@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.common import OUT, PROBLEMS
 from benchmarks.theses import closed_loop, smdw_printed
-from benchmarks.theses.climb import NAMES, climb_from, plan_of
+from benchmarks.theses.climb_trials import NAMES, climb_from, plan_of
 from benchmarks.theses.smdw_trial_figures import (
     ClimbCell,
     causes_figure,
