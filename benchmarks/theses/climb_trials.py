@@ -130,7 +130,7 @@ def trials_of(
             source,
             n,
             c.step.friction,
-            c.step.torque,
+            float(c.step.robot.motor_array("torque").min()),
             o.critical_up,
             o.first_attempt,
             o.all_up,

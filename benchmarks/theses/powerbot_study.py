@@ -118,7 +118,7 @@ def problem(number: int) -> Problem:
 
 def timed(task: Problem, variant: str, engine: str = "auto") -> Trajectory:
     """The path of a problem, timed."""
-    limits = task.as_limits(variant="thesis" if variant == "thesis" else "physical")
+    limits = task.replace({"limits.variant": variant if variant == "thesis" else None}).limits
     return time_scale(task.path, limits, robot=task.robot, ground=task.scene.ground, engine=engine)
 
 

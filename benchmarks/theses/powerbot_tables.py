@@ -178,8 +178,8 @@ def refinements(numbers: Sequence[int]) -> ResultTable:
                 cells.append(f"{limit_jerk(base, jerk).duration:.2f}")
             except TrajoptError as error:
                 cells.append(type(error).__name__)
-        level, ramps = corridor(task.flat_path), [r.ramp for r in task.ramps]
-        count = len(task.path.knots) - 2
+        level, ramps = corridor(task.flat_path), [r.ramp for r in task.ground.ramps]
+        count = len(task.flat_path.basis.knots) - 2
         found = optimize_path(
             lambda z, level=level, ramps=ramps: lay_over(level(z), ramps) if ramps else level(z),
             np.tile([-CORRIDOR, CORRIDOR], (count, 1)),
@@ -236,7 +236,9 @@ def draw_plans() -> list[str]:
             ("optimal, physical limits", timed(task, "physical")),
         ]
         made += [
-            draw_path(plans[2][1], FIGURES / f"path_{number}.png", knots=task.path.knots),
+            draw_path(
+                plans[2][1], FIGURES / f"path_{number}.png", knots=task.flat_path.points.tolist()
+            ),
             draw_profiles(plans, FIGURES / f"profiles_{number}.png"),
         ]
     made.append(

@@ -26,8 +26,8 @@ def following_in_physics() -> ResultTable:
     from trajopt.systems.powerbot.drive import drive_plan
 
     task, robot = problem(6), BALANCED
-    profile = task.speed_profile()
-    assert profile is not None
+    assert task.profile is not None
+    profile = task.profile.bound
     rows = []
     for manner in ("below", "least_squares"):
         plan = follow(
@@ -38,7 +38,7 @@ def following_in_physics() -> ResultTable:
             manner="below" if manner == "below" else "least_squares",
         )
         for loop, tracker in (("open", None), ("closed", Tracker())):
-            scene = Scene(task.friction, Flat())
+            scene = Scene(task.ground.friction, Flat())
             seen = drive_plan(plan.trajectory, scene, tracker=tracker)
             run = seen.recording
             moving = run.times <= plan.trajectory.duration
@@ -87,7 +87,7 @@ def physics(numbers: Sequence[int]) -> ResultTable:
         plan = time_scale(
             task.path, with_friction(task, RESERVE), robot=robot, ground=task.scene.ground
         )
-        scene = Scene(task.friction, task.terrain)
+        scene = task.scene
         theirs = [m for m in measured if int(m["experiment"]) == number]
         for loop, tracker in (("open", None), ("closed", Tracker())):
             seen = drive_plan(plan, scene, tracker=tracker)
@@ -129,8 +129,8 @@ def physics(numbers: Sequence[int]) -> ResultTable:
 def following() -> ResultTable:
     """Experiment 6."""
     task = problem(6)
-    profile = task.speed_profile()
-    assert profile is not None
+    assert task.profile is not None
+    profile = task.profile.bound
     rows = []
     for manner in ("below", "least_squares"):
         found = follow(

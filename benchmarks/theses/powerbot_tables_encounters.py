@@ -92,7 +92,7 @@ def encounter_three() -> ResultTable:
 def visits(task: Problem) -> dict[str, tuple[Sensor, list[Visitor]]]:
     """Experiment 3's obstacles, as it prints them and on tracks; the sensor knows how fast they may
     be."""
-    times = [(thing.appears, thing.clears_after, thing.distance) for thing in task.obstacles]
+    times = [(thing.appears, thing.clears_after, thing.distance) for thing in task.encounters]
     sonar = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME)
     slow = Sensor(SONAR_RANGE, SCAN_TIME, REACTION_TIME, unseen_speed=SLOW)
     edge = (
@@ -130,7 +130,7 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
         seen = drive_encounter(
             where,
             robot,
-            Scene(task.friction, Flat()),
+            Scene(task.ground.friction, Flat()),
             sensor,
             visitors,
             longest=300.0,

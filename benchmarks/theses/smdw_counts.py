@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from benchmarks.common import ResultTable
@@ -103,7 +103,7 @@ def orders(cells: Sequence[ClimbCell]) -> ResultTable:
     )
 
 
-def regimes(engines: Sequence[str]) -> ResultTable:
+def regimes(engines: Iterable[str]) -> ResultTable:
     """Where phase decides: how many phases climb (in at least half of their runs) at each torque
     and friction."""
     rows: list[tuple[str, ...]] = []
