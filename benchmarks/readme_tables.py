@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from benchmarks.theses.climb import SOURCES, THESIS
+from benchmarks.theses.climb import SOURCES
+from benchmarks.theses.climb_tables import THESIS
 from benchmarks.theses.closed_loop import SETTINGS
 from trajopt.report.intervals import wilson
 

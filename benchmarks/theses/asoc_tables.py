@@ -15,14 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.common import OUT, ResultTable, publish
-from benchmarks.theses.asoc_pictures import (
-    curve_figure,
-    front_figure,
-    map_figure,
-    speed_figure,
-    tracks_figure,
-)
+from benchmarks.common import ResultTable, publish
+from benchmarks.theses.asoc_designs import optimizers, pareto
+from benchmarks.theses.asoc_draw import draw, mean, ring
 from benchmarks.theses.asoc_reference import (
     FIGURE_9,
     FIGURE_11,
@@ -31,58 +26,27 @@ from benchmarks.theses.asoc_reference import (
     TABLE_4,
     TABLE_5,
     TABLE_6,
-    TABLE_9,
-    TABLE_10,
 )
-from benchmarks.theses.asoc_study import best_ratio, best_width, full_factorial, square_corners
+from benchmarks.theses.asoc_study import best_ratio, best_width, full_factorial
 from benchmarks.theses.asoc_suspension import POINT_DESIGN, FourBar, Linkage, suspension_travel
 from benchmarks.theses.asoc_tables_tracking import (
-    FAST,
     FULL,
-    GEOMETRY,
-    KNOWLEDGE,
-    NO_SLIP,
     QUICK,
     Effort,
     physics,
     physics_knowledge,
-    runs,
     tables_9_and_10,
 )
-from benchmarks.theses.pareto import ParetoFront, pareto_front
 from benchmarks.theses.textbook import TEXTBOOK
-from trajopt.arrays import Array
-from trajopt.errors import TrajoptError
-from trajopt.optimize.base import Budget, Optimizer
-from trajopt.optimize.ipopt import Ipopt
-from trajopt.optimize.pso import thesis_enhanced, thesis_first
-from trajopt.optimize.search import minimize, optimizer_names
-from trajopt.report.robot_picture import robot_figure
-from trajopt.report.style import in_style, save_figure
 from trajopt.robots.mobility import mobility_of
 from trajopt.systems.asoc.design import TERMS, AsocDesign, Model
-from trajopt.systems.asoc.isotropy import Contact, mean_isotropy, spread_modules
-from trajopt.systems.asoc.modules import (
-    asoc_robot,
-    largest_pivot,
-    link_velocities,
-    wheel_steering,
-)
+from trajopt.systems.asoc.isotropy import Contact, spread_modules
+from trajopt.systems.asoc.modules import largest_pivot
 from trajopt.systems.asoc.run import AsocRun
 from trajopt.systems.asoc.soil import soil_named
-from trajopt.systems.asoc.tracking import Knowledge
 
 PACKAGES = ("trajopt", "numpy", "scipy", "casadi", "pymoo", "mujoco", "pybullet")
-FIGURES = OUT / "asoc"
-RESTARTED = 200_000  # evaluations of the thesis's undamped swarms in restarts; ten seeds end at most 0.44 % short
 BASELINE = (0.15, 0.20, 0.15, 0.03)  # m, Table VI: offset, split, radius, width
-
-
-def mean(places: Array, ratio: float, effort: Effort, **options: object) -> float:
-    found = mean_isotropy(
-        places, ratio, rng=np.random.default_rng(0), points=effort.points, shifts=4, **options
-    )  # type: ignore[arg-type]  # options of several types
-    return found.value
 
 
 def mobility() -> ResultTable:
@@ -142,11 +106,6 @@ def table_2(effort: Effort) -> ResultTable:
         ("angle, deg", "printed isotropy", "printed ratio", "isotropy", "ratio"),
         rows,
     )
-
-
-def ring(first: float, second: float) -> Array:
-    angles = np.radians([0.0, first, second])
-    return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
 def figures_9_and_11(effort: Effort) -> ResultTable:
@@ -258,208 +217,6 @@ def table_4() -> ResultTable:
         ("reading", "ASOCs", *TERMS),
         rows,
     )
-
-
-def optimizers(effort: Effort) -> ResultTable:
-    rows = []
-    design = AsocDesign(soil_named("sandy_loam"))
-    _ = design.peaks
-    began = time.perf_counter()
-    best, total = full_factorial(design)
-    rows.append(
-        (
-            "full factorial 31^4",
-            f"{total:.5f}",
-            "",
-            "923521",
-            f"{1e3 * (time.perf_counter() - began):.0f}",
-            " ".join(f"{v:.4f}" for v in best),
-            "",
-        )
-    )
-    evaluations = 25_000 if effort is FULL else 6_000
-    special: dict[str, tuple[Optimizer, int]] = {
-        "ipopt, 1 start": (Ipopt(starts=1), evaluations),
-        "pso-thesis-first, restarts": (
-            replace(thesis_first(), stagnation=20, restart=True),
-            RESTARTED,
-        ),
-        "pso-thesis-enhanced, restarts": (
-            replace(thesis_enhanced(), stagnation=20, restart=True),
-            RESTARTED,
-        ),
-    }
-    for name in (*special, *optimizer_names()):
-        method, allowed = special.get(name, (name, evaluations))
-        budget = Budget(evaluations=allowed)
-        try:
-            minimize(
-                design, design.bounds, optimizer=method, budget=Budget(evaluations=10)
-            )  # loads packages
-            began = time.perf_counter()
-            found = minimize(design, design.bounds, optimizer=method, seed=1, budget=budget)
-        except TrajoptError as refusal:
-            rows.append((name, "", "", "", "", "", str(refusal)))
-            continue
-        rows.append(
-            (
-                name,
-                f"{-found.fun:.5f}",
-                f"{100 * (-found.fun / total - 1):+.3f} %",
-                str(found.nfev),
-                f"{1e3 * (time.perf_counter() - began):.0f}",
-                " ".join(f"{v:.4f}" for v in found.x),
-                found.status.name.lower(),
-            )
-        )
-    return ResultTable(
-        "Design problem, sandy loam, three ASOCs, physical reading: the same J by every optimizer",
-        (
-            "optimizer",
-            "J",
-            "against factorial",
-            "evaluations",
-            "ms",
-            "offset split gap width, m",
-            "note",
-        ),
-        rows,
-    )
-
-
-def pareto(effort: Effort) -> tuple[ResultTable, ParetoFront, AsocDesign]:
-    design = AsocDesign(soil_named("sandy_loam"))
-    front = pareto_front(
-        design.term_values, design.bounds, len(TERMS), seed=1, generations=effort.pareto
-    )
-    peaks = np.array([design.peaks[t] for t in TERMS])
-    rows = []
-    for k, name in enumerate(TERMS):
-        i = int(np.argmax(front.terms[:, k]))
-        rows.append(
-            (
-                f"most {name}",
-                *(f"{v:.3f}" for v in front.terms[i] / peaks),
-                " ".join(f"{v:.3f}" for v in front.designs[i]),
-            )
-        )
-    return (
-        ResultTable(
-            f"Pareto front (NSGA-II, {len(front.terms)} designs), terms as shares of the factorial's best",
-            ("design", *TERMS, "offset split gap width, m"),
-            rows,
-        ),
-        front,
-        design,
-    )
-
-
-def draw_isotropy(effort: Effort) -> None:
-    few = replace(effort, points=256)
-    ratios = np.linspace(0.8, 4.0, 49)
-    curve = np.array([mean(spread_modules(3), float(r), few) for r in ratios])
-    save_figure(
-        curve_figure(
-            ratios, curve, FIGURE_9, ("Figure 9: three ASOCs", "split / offset", "mean isotropy")
-        ),
-        FIGURES / "figure_09.png",
-    )
-    angles = np.linspace(0, 120, 25)
-    curve = np.array([mean(ring(a, 2 * a), 2.0, few) for a in angles])
-    save_figure(
-        curve_figure(
-            angles, curve, FIGURE_11, ("Figure 11: modules at 0, a, 2a", "a, deg", "mean isotropy")
-        ),
-        FIGURES / "figure_11.png",
-    )
-    split, offset = np.linspace(0.05, 0.5, 181), np.linspace(0.03, 0.25, 177)
-    table = np.linspace(0.15, 18.0, 400)
-    values = np.array([mean(spread_modules(4), float(r), replace(few, points=64)) for r in table])
-    area = np.interp(split[None, :] / offset[:, None], table, values)
-    save_figure(
-        map_figure(split, offset, area, ("Figure 8: four ASOCs", "split, m", "offset, m")),
-        FIGURES / "figure_08.png",
-    )
-    ratios, degrees = np.linspace(1.5, 3.2, 35), np.linspace(0, 45, 16)
-    area = np.array(
-        [
-            [
-                mean(
-                    spread_modules(3),
-                    float(r),
-                    few,
-                    tilts=(-np.radians(d), 0.0, np.radians(d)),
-                    jacobian="forward",
-                )
-                for r in ratios
-            ]
-            for d in degrees
-        ]
-    )
-    ridge = (2 / np.cos(np.radians(degrees)), degrees)
-    save_figure(
-        map_figure(
-            ratios,
-            degrees,
-            area,
-            ("Figure 13: tilts -max, 0, +max", "split / offset", "largest tilt, deg"),
-            ridge,
-        ),
-        FIGURES / "figure_13.png",
-    )
-
-
-def draw_tracking(effort: Effort, physical: list[tuple[str, AsocRun]]) -> None:
-    corners = square_corners()
-    known = [(f"sigma {s:g} cm", runs(s / 100, Knowledge(), FAST, effort)[0]) for s in TABLE_9]
-    save_figure(
-        tracks_figure(
-            corners, [(n, r.pose[:, :2]) for n, r in known], "Figure 29: 1.5 m/s, all known"
-        ),
-        FIGURES / "figure_29.png",
-    )
-    save_figure(
-        speed_figure([(n, r.times[:-1], r.speed) for n, r in known[::3]], 1.5, "Figure 30: speed"),
-        FIGURES / "figure_30.png",
-    )
-    blind = [
-        (
-            f"{'0.5 Hz' if p else 'dead reckoning'}, ground {'known' if t else 'unknown'}",
-            runs(0.03, KNOWLEDGE[p, t], NO_SLIP, effort)[0].pose[:, :2],
-        )
-        for p, t in TABLE_10
-    ]
-    save_figure(
-        tracks_figure(corners, blind, "Figure 31: sigma 3 cm, no slip"), FIGURES / "figure_31.png"
-    )
-    level = [(name, run.pose[:, :2]) for name, run in physical if ", 0 cm" in name]
-    if level:
-        save_figure(
-            tracks_figure(corners, level, "Physics, level ground"), FIGURES / "physics_level.png"
-        )
-
-
-def draw(
-    effort: Effort, front: ParetoFront, design: AsocDesign, physical: list[tuple[str, AsocRun]]
-) -> None:
-    FIGURES.mkdir(parents=True, exist_ok=True)
-    with in_style():
-        draw_isotropy(effort)
-        draw_tracking(effort, physical)
-        peaks = np.array([design.peaks[t] for t in TERMS])
-        best = np.array(list(design.describe(full_factorial(design)[0]).values())) / peaks
-        save_figure(front_figure(front.terms / peaks, TERMS, best), FIGURES / "pareto.png")
-        twist = np.array([0.6, 0.6, 0.7])
-        links = link_velocities(GEOMETRY.positions, twist)
-        trailing = np.arctan2(links[:, 1], links[:, 0]) - np.arcsin(
-            GEOMETRY.offset * twist[2] / np.linalg.norm(links, axis=1)
-        )  # modules at rest against the body
-        save_figure(
-            robot_figure(
-                asoc_robot(GEOMETRY), steering=wheel_steering(GEOMETRY, trailing), twist=twist
-            ),
-            FIGURES / "platform.png",
-        )
 
 
 NOTES = (

@@ -11,39 +11,41 @@ trial is seeded by its place.
 from __future__ import annotations
 
 import argparse
-import csv
 import math
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.random import Generator
 
-from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
+from benchmarks.common import PROBLEMS, publish
+from benchmarks.theses.climb_tables import CAUSES_FRICTION, CAUSES_TORQUES, NOTE, PHASES, table_of
+from benchmarks.theses.climb_trials import (
+    FILES,
+    NAMES,
+    POSITION_SD,
+    WHEEL_SD,
+    YAW_SD,
+    Trial,
+    climb_from,
+    keep,
+    kept,
+    plan_of,
+    trials_of,
+)
 from trajopt.arrays import Array
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.search import minimize
 from trajopt.problem import Problem, load_problem
-from trajopt.systems.smdw.climb import (
-    CLIMB_SPEED,
-    Climb,
-    Outcome,
-    Rate,
-    climb_all,
-    reached,
-    run_approach,
-)
+from trajopt.systems.smdw.climb import CLIMB_SPEED, Climb, Outcome, climb_all, reached, run_approach
 from trajopt.systems.smdw.configurations import (
     Configuration,
     approach_target,
     configurations_of,
     travel_to_step,
 )
-from trajopt.systems.smdw.planner import Plan, plan_configuration
 from trajopt.systems.smdw.thesis import through_drives
 from trajopt.systems.smdw.trials import (
-    NEAREST,
     approach_command,
     before_step,
     critical_wheels,
@@ -51,88 +53,16 @@ from trajopt.systems.smdw.trials import (
     step_scene,
 )
 
-FILES = {0.035: "step_3_5cm.toml", 0.05: "step_5cm.toml"}
-NAMES = {"lateral left": "lateral", "forward -35 deg": "forward35", "forward -45 deg": "forward45"}
 SCENARIO = {0.035: 2, 0.05: 1}
-# [guzman2015], sections 6.1, 6.1.1, 6.2: climbs in 10 runs (scenario 1 for 5 cm; both scenarios for
-# 3.5 cm).
-THESIS = {
-    ("lateral", 0.05): "0/10",
-    ("forward35", 0.05): "5/10",
-    ("forward45", 0.05): "5-6/10",
-    ("lateral", 0.035): "4/10, 2/10",
-    ("forward35", 0.035): "most, 10/10",
-    ("forward45", 0.035): "most, 10/10",
-}
-FRICTION = (0.6, 1.0)  # range, issue's trials
-POSITION_SD, YAW_SD, WHEEL_SD = (
-    0.003,
-    math.radians(0.5),
-    0.05,
-)  # m, rad, rad: of the state a climb starts from; chosen
 PSO_SEARCHES = 5  # of the thesis's PSO, each serving an equal share of the trials
-PHASES = np.linspace(-2.4, 2.4, 9)  # rad, along the rotation, where the wheel meets the step
 TORQUES, FRICTIONS = (2.0, 4.0, 8.0), (0.5, 0.8)
 CAUSES = {
     "heading error at the end, deg": (0.0, 2.0, 5.0, 10.0),
     "gap, cm": (2.0, 5.0, 10.0, 20.0),
     "approach speed, rad/s": (2.0, 4.0, 8.5, 15.0),
 }
-CAUSES_TORQUES, CAUSES_FRICTION = (
-    {"lateral": 3.0, "forward35": 2.0},
-    0.8,
-)  # N m, -: chosen, where climbs are in doubt
 SOURCES = ("exact", "thesis PSO", "uniform")
 PACKAGES = ("numpy", "mujoco", "pybullet")
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One row of the trial file."""
-
-    part: str
-    engine: str
-    height: float
-    configuration: str
-    source: str
-    number: int
-    friction: float
-    torque: float
-    critical_up: bool
-    first_attempt: bool
-    all_up: bool
-    exploded: bool
-    reason: str
-    seconds: float  # wall time, mean of its cell; nan where it was not taken
-
-
-def plan_of(problem: Problem, configuration: Configuration) -> Plan:
-    """The exact plan; these problems all have one."""
-    plan = plan_configuration(problem, configuration)
-    if not isinstance(plan, Plan):
-        raise SystemExit(f"{configuration.name}: {plan.reason}")
-    return plan
-
-
-def climb_from(
-    problem: Problem, plan: Plan, wheels: Array, rng: Generator, yaw_error: float = 0.0
-) -> Climb:
-    """Sub-test 2 from the plan's target with random state errors and friction, and the given wheel
-    angles (4,)."""
-    x, y, yaw = plan.target.pose
-    dx = min(float(rng.normal(0.0, POSITION_SD)), problem.climb.gap - NEAREST)
-    shift = np.array([dx, rng.normal(0.0, POSITION_SD), yaw_error + rng.normal(0.0, YAW_SD)])
-    angles = wheels + rng.normal(0.0, WHEEL_SD, 4)
-    pose = before_step(problem, np.array([x, y, yaw]) + shift)
-    c = plan.configuration
-    return Climb(
-        step_scene(problem, float(rng.uniform(*FRICTION))),
-        pose,
-        four(angles),
-        c.direction,
-        critical_wheels(c),
-        plan.target.travel,
-    )
 
 
 def pso_endings(height: float, name: str, searches: int) -> list[tuple[Array, float]]:
@@ -193,7 +123,7 @@ def planned(
                 started = time.perf_counter()
                 outcomes = climb_all(climbs, engine=engine, workers=workers)
                 cost = (time.perf_counter() - started) / len(climbs)
-                yield _rows("planned", engine, name, source, climbs, outcomes, cost)
+                yield trials_of("planned", engine, name, source, climbs, outcomes, cost)
 
 
 def driven(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
@@ -220,7 +150,7 @@ def driven(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
                     replace(climb, pose=before_step(problem, np.array(pose)), wheels=wheels)
                 )
             outcomes = climb_all(climbs, engine=engine, workers=workers)
-            yield _rows(
+            yield trials_of(
                 "driven",
                 engine,
                 NAMES[configuration.name],
@@ -250,7 +180,7 @@ def phases(engine: str, runs: int, workers: int) -> Iterator[list[Trial]]:
                     yield [
                         row
                         for label, climb, outcome in zip(labels, climbs, outcomes, strict=True)
-                        for row in _rows(
+                        for row in trials_of(
                             "phases", engine, NAMES[configuration.name], label, [climb], [outcome]
                         )
                     ]
@@ -296,7 +226,7 @@ def causes(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
                     climbs = [
                         _caused(problem, configuration, cause, value, n) for n in range(trials)
                     ]
-                    yield _rows(
+                    yield trials_of(
                         "causes",
                         engine,
                         name,
@@ -327,110 +257,6 @@ def _caused(
         critical_wheels(configuration),
         travel_to_step(problem, configuration, start),
         speed,
-    )
-
-
-def _rows(
-    part: str,
-    engine: str,
-    name: str,
-    source: str,
-    climbs: Sequence[Climb],
-    outcomes: Sequence[Outcome],
-    seconds: float = math.nan,
-) -> list[Trial]:
-    return [
-        Trial(
-            part,
-            engine,
-            c.step.height,
-            name,
-            source,
-            n,
-            c.step.friction,
-            c.step.torque,
-            o.critical_up,
-            o.first_attempt,
-            o.all_up,
-            o.exploded,
-            o.reason,
-            seconds,
-        )
-        for n, (c, o) in enumerate(zip(climbs, outcomes, strict=True))
-    ]
-
-
-def rate_table(title: str, trials: Sequence[Trial]) -> ResultTable:
-    """Rates with Wilson intervals, one row a cell, the thesis's count beside."""
-    rows = []
-    for key in dict.fromkeys((t.engine, t.height, t.configuration, t.source) for t in trials):
-        cell = [t for t in trials if (t.engine, t.height, t.configuration, t.source) == key]
-        shares = [
-            _share(
-                [bool(getattr(t, what)) for t in cell if not t.exploded],
-                sum(t.exploded for t in cell),
-            )
-            for what in ("critical_up", "first_attempt", "all_up")
-        ]
-        cost = "" if math.isnan(cell[0].seconds) else f"{cell[0].seconds:.2f}"
-        rows.append(
-            (
-                key[0],
-                f"{100 * key[1]:g}",
-                key[2],
-                key[3],
-                *(_text(s) for s in shares),
-                str(shares[0].exploded),
-                cost,
-                "" if cell[0].part == "causes" else THESIS[key[2], key[1]],
-            )
-        )
-    return ResultTable(
-        title,
-        (
-            "engine",
-            "step, cm",
-            "configuration",
-            "planned by",
-            "critical wheels up",
-            "first attempt",
-            "all four up",
-            "exploded",
-            "s a trial",
-            "thesis",
-        ),
-        rows,
-    )
-
-
-def _share(values: list[bool], exploded: int) -> Rate:
-    return Rate(sum(values), len(values), exploded)
-
-
-def _text(share: Rate) -> str:
-    low, high = share.interval
-    return f"{share.successes}/{share.trials} ({low:.2f}-{high:.2f})"
-
-
-def phase_table(trials: Sequence[Trial]) -> ResultTable:
-    """Critical wheels up over phase: one row a torque and friction."""
-    rows = []
-    labels = [f"{phase:+.2f}" for phase in PHASES]
-    for key in dict.fromkeys(
-        (t.engine, t.height, t.configuration, t.torque, t.friction) for t in trials
-    ):
-        cell = [
-            t for t in trials if (t.engine, t.height, t.configuration, t.torque, t.friction) == key
-        ]
-        counts = []
-        for label in labels:
-            sound = [t for t in cell if t.source == label and not t.exploded]
-            counts.append(f"{sum(t.critical_up for t in sound)}/{len(sound)}")
-        rows.append((key[0], f"{100 * key[1]:g}", key[2], f"{key[3]:g}", f"{key[4]:g}", *counts))
-    return ResultTable(
-        "Critical wheels up over phase where the wheel meets the step (rad along the rotation)",
-        ("engine", "step, cm", "configuration", "torque, N m", "friction", *labels),
-        rows,
     )
 
 
@@ -471,68 +297,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
         }[part]()
         for rows in work:  # written after every cell, so that a run cut short is kept
             cells.setdefault(part, []).extend(rows)
-            _keep(name, [row for cell in cells.values() for row in cell])
+            keep(name, [row for cell in cells.values() for row in cell])
     publish(
-        name, [_table(part, rows) for part, rows in cells.items()], packages=PACKAGES, notes=[NOTE]
+        name,
+        [table_of(part, rows) for part, rows in cells.items()],
+        packages=PACKAGES,
+        notes=[NOTE],
     )
-
-
-NOTE = (
-    "A wheel is up when its centre stays risen by 0.7 of the step's height over the last 0.2 s. First attempt: "
-    "within half a turn of meeting the step (forward: the leading wheel; lateral: both). Brackets: Wilson, 95 %. "
-    f"Friction {FRICTION[0]}-{FRICTION[1]}, 8 N m, unless the row says otherwise. A heading error turns the robot "
-    f"about its centre; where a corner then is within {1e3 * NEAREST:g} mm of the step the robot is moved back, so "
-    "gaps and phases at contact change with it. Exploded runs are counted apart. "
-    "Thesis: runs that climbed, in another simulator."
-)
-
-
-def _table(part: str, rows: Sequence[Trial]) -> ResultTable:
-    if part == "phases":
-        return phase_table(rows)
-    titles = {
-        "planned": "Sub-test 2 from planned states",
-        "driven": "Sub-test 1 open loop, then sub-test 2",
-        "causes": f"What else sets the rate: friction {CAUSES_FRICTION:g}, "
-        + ", ".join(f"{name} at {torque:g} N m" for name, torque in CAUSES_TORQUES.items()),
-    }
-    return rate_table(titles[part], rows)
-
-
-def kept(name: str) -> list[Trial]:
-    """Trials that an earlier run wrote."""
-    file = OUT / f"{name}_trials.csv"
-    if not file.exists():
-        return []
-    with file.open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-    return [
-        Trial(
-            r["part"],
-            r["engine"],
-            float(r["height"]),
-            r["configuration"],
-            r["source"],
-            int(r["number"]),
-            float(r["friction"]),
-            float(r["torque"]),
-            r["critical_up"] == "True",
-            r["first_attempt"] == "True",
-            r["all_up"] == "True",
-            r["exploded"] == "True",
-            r["reason"],
-            float(r.get("seconds") or math.nan),
-        )
-        for r in rows
-    ]
-
-
-def _keep(name: str, rows: Sequence[Trial]) -> None:
-    OUT.mkdir(parents=True, exist_ok=True)
-    with (OUT / f"{name}_trials.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(asdict(rows[0])))
-        writer.writeheader()
-        writer.writerows(asdict(row) for row in rows)
 
 
 if __name__ == "__main__":

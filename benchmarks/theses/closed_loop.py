@@ -28,7 +28,7 @@ from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
 from trajopt.systems.smdw.configurations import configurations_of
 from trajopt.systems.smdw.entry import free_ground
 from trajopt.systems.smdw.planner import Plan, plan_configuration
-from trajopt.systems.smdw.trials import four, step_scene
+from trajopt.systems.smdw.trials import four, largest_wheel_speed, step_scene
 
 FILES = ("step_5cm.toml", "step_3_5cm.toml")  # scenarios 1 and 2
 NAMES = (
@@ -93,7 +93,7 @@ def trial(
         problem.robot,
         initial,
         critical,
-        cap=problem.limits.wheel_speed or math.inf,
+        cap=largest_wheel_speed(problem),
         ground=free_ground(problem),
         mode=mode,
     )

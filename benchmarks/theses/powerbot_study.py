@@ -3,18 +3,35 @@ speeds, its factor of linear time scaling."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
+from benchmarks.common import OUT, PROBLEMS, ROOT
 from trajopt.control.commands import commands, driven
 from trajopt.control.encounter import Course, Obstacle
 from trajopt.control.replan import TIME_STEP, Sensor, SpeedPlan
+from trajopt.control.tracking import Tracker
+from trajopt.problem import Problem, load_problem
+from trajopt.robots.robot import robot
+from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 
 _FINE = 0.01  # s between points where speeds are compared; chosen
 _CREEP = 0.05  # m/s; the halving rule stops below it; chosen
+TIMED = (1, 2, 4, 5)  # experiments that the thesis scales linearly
+FIGURES = OUT / "powerbot_tables"
+# balancing castors: one point of support behind
+BALANCED = robot(
+    "powerbot",
+    {"wheels.castor-left.position": [-0.31, 0.0], "wheels.castor-right.position": [-0.31, 0.0]},
+)
+START_ERROR = (0.0, 0.02, math.radians(1.0))  # m, m, rad; chosen
+SETTLE = Tracker().settle  # s behind the arrival
+OFF_AFTER = round(5.0 / TIME_STEP)  # samples until a start error has gone
+DATA = ROOT / "tests" / "data" / "powerbot"
 
 
 class StudyRow(NamedTuple):
@@ -92,3 +109,19 @@ def linear_factor(
             np.sqrt(braking / braking_limit),
         )
     )
+
+
+def problem(number: int) -> Problem:
+    """The problem file of an experiment."""
+    return load_problem(PROBLEMS / "powerbot" / f"experiment_{number}.toml")
+
+
+def timed(task: Problem, variant: str, engine: str = "auto") -> Trajectory:
+    """The path of a problem, timed."""
+    limits = task.replace({"limits.variant": variant if variant == "thesis" else None}).limits
+    return time_scale(task.path, limits, robot=task.robot, ground=task.scene.ground, engine=engine)
+
+
+def yes(holds: bool) -> str:
+    """For tables."""
+    return "yes" if holds else "no"

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.common import OUT, PROBLEMS
 from benchmarks.theses import closed_loop, smdw_printed
-from benchmarks.theses.climb import NAMES, climb_from, plan_of
+from benchmarks.theses.climb_trials import NAMES, climb_from, plan_of
 from benchmarks.theses.smdw_trial_figures import (
     ClimbCell,
     causes_figure,
@@ -28,7 +28,7 @@ from benchmarks.theses.smdw_trial_figures import (
 from benchmarks.theses.smdw_wheel_figures import cam_figure, setups_figure, wheel_at_step_figure
 from trajopt.problem import load_problem
 from trajopt.simulate.engine import ENGINES, Recording
-from trajopt.systems.smdw.climb import Climb, judge, reached, record_climb, run_approach
+from trajopt.systems.smdw.climb import Climb, StepScene, judge, reached, record_climb, run_approach
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, loc8_smdw
 from trajopt.systems.smdw.configurations import configurations_of
 from trajopt.systems.smdw.pictures import geometry_figure
@@ -111,7 +111,7 @@ def first_sub_test(figure: str, runs: Mapping[str, Driven]) -> Figure:
                 [a.pose for a in run.approaches],
                 [m < NEAR for m in misses],
                 ideal,
-                run.climbs[0].step.place[0],
+                run.climbs[0].step.step.place[0],
                 f"black: planned; blue: ends within 2 cm\nmedian miss {100 * np.median(misses):.1f} cm",
             )
         )
@@ -130,11 +130,16 @@ def second_sub_test(climbs: Mapping[str, Sequence[Climb]]) -> Figure:
                 [run.pose for run in recordings],
                 up,
                 None,
-                group[0].step.place[0],
+                group[0].step.step.place[0],
                 f"blue: leading wheels up, {sum(up)} of {len(up)}",
             )
         )
     return motions_figure(panels, loc8_smdw())
+
+
+def lowered(there: StepScene) -> StepScene:
+    """The same at the lower step."""
+    return replace(there, step=replace(there.step, height=LOW_STEP))
 
 
 def motions(runs: Mapping[int, Mapping[str, Driven]], quick: bool) -> Iterator[tuple[str, Figure]]:
@@ -154,7 +159,7 @@ def motions(runs: Mapping[int, Mapping[str, Driven]], quick: bool) -> Iterator[t
             ),
         )
     low = {
-        name: [replace(c, step=replace(c.step, height=LOW_STEP)) for c in run.climbs]
+        name: [replace(c, step=lowered(c.step)) for c in run.climbs]
         for name, run in runs[1].items()
     }
     yield (

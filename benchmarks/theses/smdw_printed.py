@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, publish
-from benchmarks.theses.climb import NAMES, THESIS
+from benchmarks.theses.climb_tables import THESIS
+from benchmarks.theses.climb_trials import NAMES
 from trajopt.problem import Problem, load_problem
 from trajopt.report.intervals import wilson
 from trajopt.robots.robot import robot

@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 
 from benchmarks.common import OUT, PROBLEMS, ResultTable, provenance, publish
 from benchmarks.theses import smdw_printed
-from benchmarks.theses.climb import NAMES
+from benchmarks.theses.climb_trials import NAMES
+from benchmarks.theses.smdw_counts import headline, orders, regimes
 from benchmarks.theses.smdw_figures import (
     TARGETS,
     Driven,
@@ -28,7 +29,8 @@ from benchmarks.theses.smdw_figures import (
     motions,
     wheel_and_set_ups,
 )
-from benchmarks.theses.smdw_page import PACKAGES, Page, headline, orders, regimes
+from benchmarks.theses.smdw_geometry_tables import agreement, geometry
+from benchmarks.theses.smdw_page import PACKAGES, Page
 from benchmarks.theses.smdw_printed import TABLES as TABLES_6
 from benchmarks.theses.smdw_printed import read
 from benchmarks.theses.smdw_searches import (
@@ -43,16 +45,14 @@ from benchmarks.theses.smdw_searches import (
     searches,
     swarms,
 )
-from benchmarks.theses.smdw_study import CLOUD_POINTS, meet_step_cloud, terminal_cost
+from benchmarks.theses.smdw_study import terminal_cost
 from trajopt.arrays import fold
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.search import minimize
 from trajopt.problem import Problem, load_problem
 from trajopt.report.style import in_style, save_figure
 from trajopt.simulate.engine import ENGINES
-from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
 from trajopt.systems.smdw.entry import WHEELS
-from trajopt.systems.smdw.geometry import contact_offset, meet_step
 from trajopt.systems.smdw.pictures import plans_figure
 from trajopt.systems.smdw.planner import plan_climb
 from trajopt.systems.smdw.thesis import through_drives
@@ -164,84 +164,6 @@ def tables_6(runs: Mapping[str, Driven]) -> ResultTable:
     return ResultTable(
         "Tables 6.2-6.4: final error of sub-test 1, mean (standard deviation)",
         ("configuration", "run", "x, m", "y, m", "yaw, rad", "median critical wheel error, rad"),
-        rows,
-    )
-
-
-def geometry() -> ResultTable:
-    rows = []
-    for name, wheel in (("default", DEFAULT_WHEEL), ("fitted to the print", FITTED_WHEEL)):
-        offsets = 100 * contact_offset(wheel, np.radians([30.0, 60.0]))
-        spans = [forward_alphas(wheel, 0.05, theta=t) for t in (0.0, None)]
-        shown = [
-            "none" if s is None else f"{-math.degrees(s[1]):.0f} to {-math.degrees(s[0]):.0f}"
-            for s in spans
-        ]
-        rows.append(
-            (
-                name,
-                f"{100 * wheel.radius:.2f}, {100 * wheel.minor_radius:.2f}",
-                f"{offsets[0]:.2f}",
-                f"{offsets[1]:.2f}",
-                f"{100 * wheel.greatest_clearance:.2f}",
-                *shown,
-            )
-        )
-    rows.append(("thesis", "not printed", "4.63", "3.49", "5 (stated)", "-40 to -13", ""))
-    return ResultTable(
-        "Wheel geometry",
-        (
-            "sizes",
-            "Rc, Re, cm",
-            "offset at 30 deg, cm",
-            "at 60 deg",
-            "Rc - Re, cm",
-            "forward alpha for 5 cm at theta 0, deg",
-            "at any theta",
-        ),
-        rows,
-    )
-
-
-def agreement(quick: bool) -> ResultTable:
-    """Largest difference between closed form and point cloud over wheel angle, yaw and three
-    heights; none left out."""
-    rows = []
-    every = 30.0 if quick else 5.0  # deg
-    yaws = np.radians(np.arange(-180.0 + every, 0.0, every))
-    for name, wheel in (("default", DEFAULT_WHEEL), ("fitted to the print", FITTED_WHEEL)):
-        apart, nodes, verdicts = np.zeros(4), 0, 0
-        for height in (0.02, 0.035, 0.045):
-            for theta in np.radians(np.arange(-180.0, 180.0, every)):
-                exact = meet_step(wheel, theta, yaws, height)
-                for k, yaw in enumerate(yaws):
-                    cloud = meet_step_cloud(wheel, float(theta), float(yaw), height)
-                    nodes, verdicts = (
-                        nodes + 1,
-                        verdicts + int(bool(cloud.over) != bool(exact.over[k])),
-                    )
-                    if cloud.over and exact.over[k]:
-                        apart = np.maximum(
-                            apart,
-                            [
-                                abs(cloud.clearance - exact.clearance[k]),
-                                abs(cloud.offset - exact.offset[k]),
-                                abs(cloud.arm - exact.arm[k]),
-                                abs(math.degrees(cloud.tangent - exact.tangent[k])),
-                            ],
-                        )
-        rows.append((name, str(nodes), str(verdicts), *(f"{value:.2g}" for value in apart)))
-    return ResultTable(
-        f"Wheel geometry: closed form against {CLOUD_POINTS:,} points, largest difference",
-        (
-            "sizes",
-            "nodes",
-            "verdicts that differ",
-            "clearance, m",
-            "contact offset, m",
-            "lever arm, m",
-            "tangent angle, deg",
-        ),
         rows,
     )
 

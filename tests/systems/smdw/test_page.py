@@ -11,11 +11,18 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks.theses import closed_loop, smdw_figures, smdw_page, smdw_printed, smdw_searches
+from benchmarks.theses import (
+    closed_loop,
+    smdw_counts,
+    smdw_figures,
+    smdw_page,
+    smdw_printed,
+    smdw_searches,
+)
 from benchmarks.theses.smdw_study import terminal_cost
 from benchmarks.theses.smdw_trial_figures import ClimbCell
 
-EXACT, PSO, UNIFORM = smdw_page.SOURCE_NAMES.values()
+EXACT, PSO, UNIFORM = smdw_counts.SOURCE_NAMES.values()
 
 
 def cells(counts: dict[tuple[str, str], int]) -> list[ClimbCell]:
@@ -25,7 +32,7 @@ def cells(counts: dict[tuple[str, str], int]) -> list[ClimbCell]:
 
 
 def test_the_headline_pools_forward_and_names_what_was_not_run() -> None:
-    table = smdw_page.headline(
+    table = smdw_counts.headline(
         cells(
             {
                 ("lateral", EXACT): 19,
@@ -45,13 +52,13 @@ def test_the_headline_pools_forward_and_names_what_was_not_run() -> None:
 
 
 def test_an_order_is_claimed_only_where_intervals_are_apart() -> None:
-    assert smdw_page.ordered({"a": (2, 20), "b": (20, 20), "c": (19, 20)}) == "b ~ c > a"
-    assert smdw_page.ordered({"a": (10, 10), "b": (20, 20)}) == "a = b"
-    assert smdw_page.ordered({}) == "not run"
+    assert smdw_counts.ordered({"a": (2, 20), "b": (20, 20), "c": (19, 20)}) == "b ~ c > a"
+    assert smdw_counts.ordered({"a": (10, 10), "b": (20, 20)}) == "a = b"
+    assert smdw_counts.ordered({}) == "not run"
 
 
 def test_the_reading_names_the_lines_in_which_planners_differ() -> None:
-    text = smdw_page.reading(
+    text = smdw_counts.reading(
         cells(
             {
                 ("lateral", EXACT): 20,
@@ -83,7 +90,7 @@ def test_phase_decides_where_some_phases_climb(monkeypatch: pytest.MonkeyPatch) 
     ]
     rows += [row("4.0", "-0.60", up) for up in (True, True, False)] + [row("4.0", "+0.60", False)]
     monkeypatch.setattr(smdw_figures, "trial_rows", {"phases": rows}.__getitem__)
-    (found,) = smdw_page.regimes(["mujoco", "pybullet"]).rows
+    (found,) = smdw_counts.regimes(["mujoco", "pybullet"]).rows
     assert found == ("mujoco", "lateral", "5", "8 N m, 0.8", "4 N m, 0.8 (1 of 2)", "2 N m, 0.8")
     drawn = smdw_figures.phase_map("mujoco")
     assert drawn is not None
@@ -156,7 +163,7 @@ def test_every_picture_has_a_place_and_every_named_picture_exists(
             if part.endswith(".png")
         }
     )
-    tables = {"headline": smdw_page.headline(cells({("lateral", EXACT): 1}))}
+    tables = {"headline": smdw_counts.headline(cells({("lateral", EXACT): 1}))}
     text = smdw_page.Page("here", cells({("lateral", EXACT): 1}), tables, "folder", names).text()
     for name in names:
         assert text.count(f"![{name}](folder/{name})") == 1, name
