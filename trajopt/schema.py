@@ -7,6 +7,7 @@ be right.
 
 from __future__ import annotations
 
+import copy
 import difflib
 import json
 import tomllib
@@ -84,7 +85,7 @@ def set_key(data: dict[str, Any], dotted: str, value: Any, file: str) -> None:
         if value is None:
             table.pop(last, None)
         else:
-            table[last] = value
+            table[last] = copy.deepcopy(value)  # never the caller's own tables
 
 
 def _tables(
