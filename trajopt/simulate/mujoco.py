@@ -216,6 +216,8 @@ class _Builder:
         kinds = self.mujoco.mjtGeom
         kind = {
             "sphere": kinds.mjGEOM_SPHERE, "cylinder": kinds.mjGEOM_CYLINDER,
+            # the two edges of a cylinder jump on height fields: an ellipsoid touches at one point
+            "disc": kinds.mjGEOM_ELLIPSOID,
             "box": kinds.mjGEOM_BOX, "ellipsoid": kinds.mjGEOM_ELLIPSOID,
             "hull": kinds.mjGEOM_MESH,
         }[shape.kind]  # fmt: skip

@@ -41,8 +41,8 @@ MAX_JOINT_SPEED = 1e4
 # Rounded margin that Bullet adds around convex hulls of a URDF [m] (gUrdfDefaultCollisionMargin).
 HULL_MARGIN = 0.001
 MOST_POINTS = 250_000  # of a height field; Bullet copies them through Python, chosen
-# Tyres give way by this much under the robot's weight, m, and this share of critical damping,
-# chosen: contacts that are equally soft share the load as the limits assume
+# Tyres on smooth ground give way by this much under the robot's weight, m, at this share of
+# critical damping, chosen: contacts that are equally soft share the load as the limits assume
 TYRE_SAG, TYRE_DAMPING = 0.001, 0.8
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
@@ -201,7 +201,17 @@ class _Session:
         self.spins, self.efforts = self._joints(spins), [links[s].joint.effort for s in spins]
         steered = [t for t in model.targets if links[t].joint.drive == "position"]
         self.steered, self.powers = self._joints(steered), [links[s].joint.effort for s in steered]
-        self.sprung = (*model.springs, *(t for t in model.targets if t not in steered))
+        # Bullet's own jointDamping does nothing to them (measured)
+        self.forced = [
+            i for i, k in enumerate(links) if k.joint.drive == "spring" or k.joint.damping > 0.0
+        ]
+        commanded = [t for t in model.targets if t not in steered]
+        self.commanded = [self.forced.index(t) for t in commanded]
+        soft = [links[i].joint for i in self.forced]
+        self.rests = np.array([joint.rest for joint in soft])
+        self.stiffness = np.array([joint.stiffness for joint in soft])
+        self.damping = np.array([joint.damping for joint in soft])
+        self.most = np.array([joint.effort for joint in soft])
 
     def _joints(self, links: list[int]) -> list[int]:
         return [self.joint[link] for link in links]
@@ -286,7 +296,7 @@ class _Session:
                 ) from error
 
     def _surface(self, number: int) -> None:
-        """Contact, damping and motor of one link.
+        """Contact and motor of one link.
 
         Joint speed or damping in the same call as friction makes Bullet drop the friction, so it
         takes three calls.
@@ -294,19 +304,17 @@ class _Session:
         bullet, robot, joint = self.bullet, self.robot, self.joint[number]
         link = self.model.links[number]
         bullet.changeDynamics(robot, joint, linearDamping=0.0, angularDamping=0.0)
-        bullet.changeDynamics(
-            robot, joint, jointDamping=link.joint.damping, maxJointVelocity=MAX_JOINT_SPEED
-        )
+        bullet.changeDynamics(robot, joint, jointDamping=0.0, maxJointVelocity=MAX_JOINT_SPEED)
         bullet.changeDynamics(
             robot, joint,
             lateralFriction=link.grip * self.stage.scene.friction, spinningFriction=0.0,
             rollingFriction=0.0, restitution=0.0,
         )  # fmt: skip
-        if number in self.model.feet and link.shapes:
+        if number in self.model.feet and link.shapes[:1] and link.shapes[0].kind == "sphere":
             load = self.model.mass / len(self.model.feet)
             stiffness = load * STANDARD_GRAVITY / TYRE_SAG
-            damping = TYRE_DAMPING * 2.0 * math.sqrt(stiffness * load)
-            bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=damping)
+            give = TYRE_DAMPING * 2.0 * math.sqrt(stiffness * load)
+            bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=give)
         meets = WHEELS if link.meets == "ground" else OUTLINE
         bullet.setCollisionFilterGroupMask(robot, joint, *meets)
         if joint >= 0:  # every joint is born with a motor that brakes it
@@ -327,17 +335,14 @@ class _Session:
                 robot, self.steered, bullet.POSITION_CONTROL,
                 targetPositions=angles[:count].tolist(), forces=self.powers,
             )  # fmt: skip
-        if self.sprung:
-            joints = [self.model.links[k].joint for k in self.sprung]
-            rests = [j.rest for j in joints[: len(self.model.springs)]] + angles[count:].tolist()
-            now = self.joints(self.sprung)[0]
-            forces = [
-                min(max(j.stiffness * (rest - at), -j.effort), j.effort)
-                for j, rest, at in zip(joints, rests, now.tolist(), strict=True)
-            ]
+        if self.forced:
+            self.rests[self.commanded] = angles[count:]
+            now, speeds, _ = self.joints(tuple(self.forced))
+            forces = self.stiffness * (self.rests - now) - self.damping * speeds
             bullet.setJointMotorControlArray(
-                robot, self._joints(list(self.sprung)), bullet.TORQUE_CONTROL, forces=forces
-            )
+                robot, self._joints(self.forced), bullet.TORQUE_CONTROL,
+                forces=np.clip(forces, -self.most, self.most).tolist(),
+            )  # fmt: skip
         bullet.stepSimulation()
 
     def base(self) -> Motion:
