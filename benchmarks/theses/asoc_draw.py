@@ -120,7 +120,7 @@ def draw_tracking(effort: Effort, physical: list[tuple[str, AsocRun]]) -> None:
     save_figure(
         tracks_figure(corners, blind, "Figure 31: sigma 3 cm, no slip"), FIGURES / "figure_31.png"
     )
-    level = [(name, run.pose[:, :2]) for name, run in physical if ", 0 cm" in name]
+    level = [(name, run.recording.pose[:, :2]) for name, run in physical if ", 0 cm" in name]
     if level:
         save_figure(
             tracks_figure(corners, level, "Physics, level ground"), FIGURES / "physics_level.png"

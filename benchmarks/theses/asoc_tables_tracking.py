@@ -13,11 +13,9 @@ from benchmarks.theses.asoc_reference import TABLE_9, TABLE_10
 from benchmarks.theses.asoc_study import constant_speed, square_corners
 from trajopt.arrays import Array
 from trajopt.errors import SimulationError
-from trajopt.systems.asoc.bullet import asoc_in_pybullet
 from trajopt.systems.asoc.modules import AsocGeometry
-from trajopt.systems.asoc.mujoco import asoc_in_mujoco
 from trajopt.systems.asoc.reference import Reference, planned_speed
-from trajopt.systems.asoc.run import AsocRun
+from trajopt.systems.asoc.run import AsocRun, drive_asoc
 from trajopt.systems.asoc.tracking import FRICTION, Knowledge, Tracking, track_many
 from trajopt.world.height_map import HeightMap
 from trajopt.world.rough import rough_ground
@@ -203,15 +201,16 @@ def ground_of(sigma: float) -> HeightMap:
 def physics(effort: Effort) -> tuple[ResultTable, list[tuple[str, AsocRun]]]:
     rows, kept = [], []
     cases = itertools.product(
-        (asoc_in_pybullet, asoc_in_mujoco), effort.physics, (FAST, PLANNED), (False, True)
+        ("pybullet", "mujoco"), effort.physics, (FAST, PLANNED), (False, True)
     )
-    for drive, sigma, command, driven in cases:
+    for name, sigma, command, driven in cases:
         if driven and sigma != 0.015:
             continue
-        name = drive.__name__.rsplit("_", 1)[1]
         label = (name, f"{100 * sigma:g}", command.name, "driven" if driven else "passive")
         try:
-            run = drive(GEOMETRY, ground_of(sigma), command.reference, driven_pivots=driven)
+            run = drive_asoc(
+                GEOMETRY, ground_of(sigma), command.reference, driven_pivots=driven, engine=name
+            )
         except SimulationError as error:
             rows.append((*label, "", "", "", "", str(error)))
             continue
@@ -224,7 +223,7 @@ def physics(effort: Effort) -> tuple[ResultTable, list[tuple[str, AsocRun]]]:
                 f"{100 * run.rms_across:.2f}",
                 str(run.losses),
                 f"{100 * run.airborne_share:.1f}",
-                f"{run.times[-1] / run.wall_time:.1f} x real time",
+                f"{run.recording.real_time_factor:.1f} x real time",
             )
         )
     return ResultTable(
@@ -255,9 +254,10 @@ def physics_knowledge(effort: Effort) -> ResultTable:
                 ground, origin=((4.5 - WIDE_FIELD) / 2,) * 2
             )  # the square in the middle
             for case, knowledge in KNOWLEDGE.items():
-                errors[case].append(
-                    asoc_in_mujoco(GEOMETRY, ground, PLANNED.reference, knowledge=knowledge).rms
+                run = drive_asoc(
+                    GEOMETRY, ground, PLANNED.reference, knowledge=knowledge, engine="mujoco"
                 )
+                errors[case].append(run.rms)
         label = f"{100 * sigma:g}"
         rows += [
             (

@@ -8,6 +8,7 @@ from rich.table import Table
 
 from trajopt.pipeline import Solution
 from trajopt.report.tables import solution_table, validation_table
+from trajopt.robots import robot
 from trajopt.simulate.check import ValidationReport
 
 
@@ -47,7 +48,7 @@ def test_a_solution_that_does_not_hold(
 
 
 def test_validation(drifted: ValidationReport) -> None:
-    text = text_of(validation_table(drifted))
+    text = text_of(validation_table(drifted, robot("loc8")))
     assert "0.040 m/s, wheel rear-right" in text
     assert "door after 1.50 s at (2.000, 0.250) m" in text
     assert "made-up 0.0" in text

@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 import os
 import sys
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,27 +20,20 @@ from numpy.typing import NDArray
 from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.robots.robot import STANDARD_GRAVITY
+from trajopt.simulate.bullet import OUTLINE, WHEELS, Client, build_stage, load_robot, shoot
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
-from trajopt.simulate.model import Model, Shape, cross
-from trajopt.simulate.scene import Solid, Stage
+from trajopt.simulate.model import Model, cross
+from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
-from trajopt.simulate.urdf import model_urdf
-from trajopt.world.height_map import HeightMap
 
 # Joints that one Bullet multibody can report; with more, joint states silently read zero
 # (measured).
 MAX_JOINTS = 121
-# Collision filters (group, mask; bits): the robot's parts meet the ground or what stands on it, and
-# never each other.
-WHEELS, GROUND, OUTLINE, OBSTACLES = (2, 1), (1, 2), (8, 4), (4, 8)
 # Bullet stops joints at 100 rad/s unless told otherwise; a roller of 9.5 mm turns at 124 rad/s in
 # lateral motion at 3 km/h [rad/s].
 MAX_JOINT_SPEED = 1e4
-# Rounded margin that Bullet adds around convex hulls of a URDF [m] (gUrdfDefaultCollisionMargin).
-HULL_MARGIN = 0.001
-MOST_POINTS = 250_000  # of a height field; Bullet copies them through Python, chosen
-# Tyres give way by this much under the robot's weight, m, and this share of critical damping,
-# chosen: contacts that are equally soft share the load as the limits assume
+# Tyres on smooth ground give way by this much under the robot's weight, m, at this share of
+# critical damping, chosen: contacts that are equally soft share the load as the limits assume
 TYRE_SAG, TYRE_DAMPING = 0.001, 0.8
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
@@ -109,35 +100,6 @@ class PyBullet:
             bullet.disconnect()
 
 
-# Functions of the module that compute and know no client.
-_PURE = (
-    "computeProjectionMatrixFOV",
-    "computeViewMatrixFromYawPitchRoll",
-    "getMatrixFromQuaternion",
-    "rotateVector",
-)
-
-
-class Client:
-    """One physics client: every call of the pybullet module, with its number added."""
-
-    def __init__(self, module: Any) -> None:
-        self._module, self._number = module, module.connect(module.DIRECT)
-        if self._number < 0:
-            raise SimulationError("pybullet could not open another physics client in this process")
-
-    def __getattr__(self, name: str) -> Any:
-        found = getattr(self._module, name)
-        if not callable(found) or isinstance(found, type) or name in _PURE:
-            return found
-
-        def call(*arguments: Any, **options: Any) -> Any:
-            return found(*arguments, **options, physicsClientId=self._number)
-
-        self.__dict__[name] = call
-        return call
-
-
 def load_bullet() -> Any:
     """The pybullet module, loaded without the build time that it prints when first imported.
 
@@ -175,8 +137,9 @@ class _Session:
         visible: bool,
     ) -> None:
         self.bullet, self.options, self.model, self.stage = bullet, options, model, stage
-        self.solids = self._build_stage(visible)
-        self.robot = self._load(start, visible)
+        self.solids = build_stage(bullet, stage, visible)
+        self.robot = load_robot(bullet, model, start, visible)
+        self.cog = np.array(model.links[0].cog)
         # Bullet numbers joints as it walks the tree; -1 is the base
         names = [
             bullet.getJointInfo(self.robot, joint)[1].decode()
@@ -201,92 +164,23 @@ class _Session:
         self.spins, self.efforts = self._joints(spins), [links[s].joint.effort for s in spins]
         steered = [t for t in model.targets if links[t].joint.drive == "position"]
         self.steered, self.powers = self._joints(steered), [links[s].joint.effort for s in steered]
-        self.sprung = (*model.springs, *(t for t in model.targets if t not in steered))
+        # Bullet's own jointDamping does nothing to them (measured)
+        self.forced = [
+            i for i, k in enumerate(links) if k.joint.drive == "spring" or k.joint.damping > 0.0
+        ]
+        commanded = [t for t in model.targets if t not in steered]
+        self.commanded = [self.forced.index(t) for t in commanded]
+        soft = [links[i].joint for i in self.forced]
+        self.rests = np.array([joint.rest for joint in soft])
+        self.stiffness = np.array([joint.stiffness for joint in soft])
+        self.damping = np.array([joint.damping for joint in soft])
+        self.most = np.array([joint.effort for joint in soft])
 
     def _joints(self, links: list[int]) -> list[int]:
         return [self.joint[link] for link in links]
 
-    def _build_stage(self, visible: bool) -> dict[int, int]:
-        """The stage's bodies: number of the solid (-1: plane or field) by Bullet's number."""
-        bullet, found = self.bullet, {}
-        if self.stage.plane:
-            found[bullet.createMultiBody(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE))] = -1
-        if self.stage.field is not None:
-            found[self._field(self.stage.field)] = -1
-        for i, solid in enumerate(self.stage.solids):
-            found[self._solid(solid, visible)] = i
-        for body, i in found.items():
-            # Bullet multiplies friction: the robot carries it all
-            bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=0.0)
-            thing = i >= 0 and self.stage.solids[i].meets == "obstacles"
-            bullet.setCollisionFilterGroupMask(body, -1, *(OBSTACLES if thing else GROUND))
-        return found
-
-    def _field(self, field: HeightMap) -> int:
-        """The height field, turned by a quarter, since Bullet cuts cells along the other diagonal
-        than the map does. Data are Z[y, x].ravel() with "rows" counting x, and the wrong order
-        loads silently; Bullet puts the middle of its extent and of its heights at the body's
-        origin."""
-        bullet, (rows, columns) = self.bullet, field.heights.shape
-        if field.heights.size > MOST_POINTS:
-            raise ArgumentError(
-                "scene.ground", field.heights.shape,
-                f"at most {MOST_POINTS} points in pybullet; crop the map",
-            )  # fmt: skip
-        shape = bullet.createCollisionShape(
-            bullet.GEOM_HEIGHTFIELD,
-            meshScale=[field.spacing, field.spacing, 1.0],
-            heightfieldData=field.heights.T[::-1].ravel().tolist(),
-            numHeightfieldRows=rows,
-            numHeightfieldColumns=columns,
-        )
-        if shape < 0:
-            raise SimulationError(
-                f"pybullet could not build a height field of {rows} x {columns} points"
-            )
-        middle = (
-            field.origin[0] + field.size[0] / 2,
-            field.origin[1] + field.size[1] / 2,
-            float(field.heights.min() + field.heights.max()) / 2,
-        )
-        quarter = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
-        return int(bullet.createMultiBody(0.0, shape, -1, middle, quarter))
-
-    def _solid(self, solid: Solid, visible: bool) -> int:
-        bullet, at = self.bullet, solid.shape.pose
-        kind, sizes = _geometry(bullet, solid.shape)
-        shape, seen = bullet.createCollisionShape(kind, **sizes), -1
-        if visible and solid.shape.kind != "hull":
-            looks = {"length" if key == "height" else key: v for key, v in sizes.items()}
-            seen = bullet.createVisualShape(kind, rgbaColor=[0.75, 0.62, 0.42, 1.0], **looks)
-        w, x, y, z = at.quaternion
-        return int(bullet.createMultiBody(0.0, shape, seen, at.place, (x, y, z, w)))
-
-    def _load(self, start: Start, visible: bool) -> int:
-        bullet, half = self.bullet, start.yaw / 2.0
-        turn = (0.0, 0.0, math.sin(half), math.cos(half))
-        self.cog = np.array(self.model.links[0].cog)
-        arm = np.array(bullet.rotateVector(turn, self.cog.tolist()))
-        with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
-            path = Path(folder) / "robot.urdf"
-            text = model_urdf(self.model, Path(folder), margin=HULL_MARGIN, visible=visible)
-            path.write_text(text, encoding="utf-8")
-            try:
-                return int(
-                    bullet.loadURDF(
-                        str(path),
-                        basePosition=(np.array(start.place) + arm).tolist(),
-                        baseOrientation=turn,
-                        flags=bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER,
-                    )
-                )
-            except bullet.error as error:
-                raise SimulationError(
-                    f"pybullet could not build the robot {self.model.name!r}: {error}"
-                ) from error
-
     def _surface(self, number: int) -> None:
-        """Contact, damping and motor of one link.
+        """Contact and motor of one link.
 
         Joint speed or damping in the same call as friction makes Bullet drop the friction, so it
         takes three calls.
@@ -294,19 +188,17 @@ class _Session:
         bullet, robot, joint = self.bullet, self.robot, self.joint[number]
         link = self.model.links[number]
         bullet.changeDynamics(robot, joint, linearDamping=0.0, angularDamping=0.0)
-        bullet.changeDynamics(
-            robot, joint, jointDamping=link.joint.damping, maxJointVelocity=MAX_JOINT_SPEED
-        )
+        bullet.changeDynamics(robot, joint, jointDamping=0.0, maxJointVelocity=MAX_JOINT_SPEED)
         bullet.changeDynamics(
             robot, joint,
             lateralFriction=link.grip * self.stage.scene.friction, spinningFriction=0.0,
             rollingFriction=0.0, restitution=0.0,
         )  # fmt: skip
-        if number in self.model.feet and link.shapes:
+        if number in self.model.feet and link.shapes[:1] and link.shapes[0].kind == "sphere":
             load = self.model.mass / len(self.model.feet)
             stiffness = load * STANDARD_GRAVITY / TYRE_SAG
-            damping = TYRE_DAMPING * 2.0 * math.sqrt(stiffness * load)
-            bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=damping)
+            give = TYRE_DAMPING * 2.0 * math.sqrt(stiffness * load)
+            bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=give)
         meets = WHEELS if link.meets == "ground" else OUTLINE
         bullet.setCollisionFilterGroupMask(robot, joint, *meets)
         if joint >= 0:  # every joint is born with a motor that brakes it
@@ -327,17 +219,14 @@ class _Session:
                 robot, self.steered, bullet.POSITION_CONTROL,
                 targetPositions=angles[:count].tolist(), forces=self.powers,
             )  # fmt: skip
-        if self.sprung:
-            joints = [self.model.links[k].joint for k in self.sprung]
-            rests = [j.rest for j in joints[: len(self.model.springs)]] + angles[count:].tolist()
-            now = self.joints(self.sprung)[0]
-            forces = [
-                min(max(j.stiffness * (rest - at), -j.effort), j.effort)
-                for j, rest, at in zip(joints, rests, now.tolist(), strict=True)
-            ]
+        if self.forced:
+            self.rests[self.commanded] = angles[count:]
+            now, speeds, _ = self.joints(tuple(self.forced))
+            forces = self.stiffness * (self.rests - now) - self.damping * speeds
             bullet.setJointMotorControlArray(
-                robot, self._joints(list(self.sprung)), bullet.TORQUE_CONTROL, forces=forces
-            )
+                robot, self._joints(self.forced), bullet.TORQUE_CONTROL,
+                forces=np.clip(forces, -self.most, self.most).tolist(),
+            )  # fmt: skip
         bullet.stepSimulation()
 
     def base(self) -> Motion:
@@ -404,29 +293,5 @@ class _Session:
 
     def render(self, camera: Camera) -> NDArray[np.uint8]:
         """Picture (H, W, 3) by Bullet's own software renderer."""
-        bullet, seen = self.bullet, self.base().place[0]
-        target = camera.target or (float(seen[0]), float(seen[1]), float(seen[2]) + 0.08)
-        view = bullet.computeViewMatrixFromYawPitchRoll(
-            target, camera.distance, math.degrees(camera.yaw), math.degrees(camera.pitch), 0.0, 2
-        )
-        lens = bullet.computeProjectionMatrixFOV(45.0, camera.width / camera.height, 0.05, 20.0)
-        shot = bullet.getCameraImage(
-            camera.width, camera.height, view, lens,
-            lightDirection=(1.0, -1.5, 3.0), shadow=1, renderer=bullet.ER_TINY_RENDERER,
-        )  # fmt: skip
-        image: NDArray[np.uint8] = np.array(shot[2], dtype=np.uint8).reshape(
-            camera.height, camera.width, 4
-        )
-        return image[:, :, :3].copy()
-
-
-def _geometry(bullet: Client, shape: Shape) -> tuple[int, dict[str, Any]]:
-    """Kind and sizes of a solid as Bullet takes them."""
-    x, _, z = shape.size
-    sizes: dict[str, tuple[int, dict[str, Any]]] = {
-        "sphere": (bullet.GEOM_SPHERE, {"radius": x}),
-        "cylinder": (bullet.GEOM_CYLINDER, {"radius": x, "height": 2.0 * z}),
-        "box": (bullet.GEOM_BOX, {"halfExtents": list(shape.size)}),
-        "hull": (bullet.GEOM_MESH, {"vertices": [list(corner) for corner in shape.corners]}),
-    }
-    return sizes[shape.kind]
+        x, y, z = (float(v) for v in self.base().place[0])
+        return shoot(self.bullet, camera, camera.target or (x, y, z + 0.08))

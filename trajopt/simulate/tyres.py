@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from trajopt.robots.description import WheelSection
 from trajopt.simulate.model import Joint, Link, Pose, Shape, cylinder, sphere
 from trajopt.simulate.rollers import disc_inertia
@@ -26,7 +28,7 @@ def tyre(wheel: WheelSection, spin: Joint, parent: int, *, disc: bool, share: fl
         spin,
         share * wheel.mass,
         (across, about, across),
-        shapes=(drum if disc else sphere(wheel.radius),),
+        shapes=(replace(drum, kind="disc") if disc else sphere(wheel.radius),),
         looks=(drum, _spoke(wheel)),
     )
 

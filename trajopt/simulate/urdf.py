@@ -69,7 +69,7 @@ def _geometry(shape: Shape, shift: Array, files: dict[Shape, str]) -> str:
     x, _, z = shape.size
     if shape.kind == "sphere":
         solid = f'<sphere radius="{x!r}"/>'
-    elif shape.kind == "cylinder":
+    elif shape.kind in ("cylinder", "disc"):
         solid = f'<cylinder radius="{x!r}" length="{2.0 * z!r}"/>'
     elif shape.kind == "box":
         solid = f'<box size="{_numbers(2.0 * half for half in shape.size)}"/>'
