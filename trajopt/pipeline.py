@@ -34,6 +34,9 @@ from trajopt.world.crossing import Standing, crossings
 from trajopt.world.scene import Scene
 
 SearchObjective = TerminalObjective | DurationObjective | ClearObjective
+# Where no wheel angle counts, every candidate is timed: 5 to 30 ms each. Chosen: within 0.1 % of
+# longer searches on a scenario's space.
+FREELY, FREE_EVALUATIONS = "slsqp", 400
 MARGIN = -1e-9  # least relative margin of a trajectory that keeps its limits
 
 
@@ -230,7 +233,8 @@ def solve(
     """Do the job of a problem (``problem.job``): search control points and time the path, time a
     given path, or what the system of a section does.
 
-    ``optimizer``, ``budget``, ``x0`` and ``progress(evaluations, best_cost)`` are of the search,
+    ``optimizer``, ``budget``, ``x0`` and ``progress(evaluations, best_cost)`` are of the search
+    (auto: the lattice of exact solutions; 400 evaluations of slsqp where no wheel angle counts),
     ``engine`` of time scaling. Without [actuator] a path is timed as fast as the limits allow, or
     as its [profile] asks; with it, at uniform spline speed in the nominal duration, as searched.
     Limits that no motion keeps are reported, not raised. Raises ArgumentError for bad arguments.
@@ -257,6 +261,8 @@ def solve(
         found = _timed(problem, problem.path, engine)
     else:
         objective = search_objective(problem)
+        if optimizer == "auto" and not problem.critical and problem.actuator is None:
+            optimizer, budget = FREELY, budget or Budget(FREE_EVALUATIONS)
         searched = minimize(
             objective,
             objective.bounds,
