@@ -1,0 +1,266 @@
+"""Every key of every section acts: another value changes what a user gets, or is refused by name.
+
+A key of the schema without a row here fails; only titles and sentences for people are exempt.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, get_args
+
+import numpy as np
+import pytest
+from pydantic import BaseModel
+from smdw_problems import ROOT
+
+from trajopt.errors import ArgumentError, ProblemError
+from trajopt.optimize.base import Budget
+from trajopt.pipeline import Solution, solve
+from trajopt.problem import Problem, load_problem
+from trajopt.problem.extensions import SECTIONS, entry
+from trajopt.report.path_picture import path_figure
+from trajopt.robots.robot import DATA
+from trajopt.schema import _models
+
+EXEMPT = {"title", "robot.about"}  # for people
+PROBLEMS = ROOT / "problems"
+STRAIGHT: dict[str, Any] = {
+    "title": "straight on",
+    "robot": {"name": "powerbot"},
+    "path": {"points": [[0.0, 0.0], [1.0, 0.1], [2.0, 0.0]]},
+    "limits": {"speed": 1.0, "acceleration": 0.5, "deceleration": 0.8, "slip": True, "tip": True},
+    "ground": {"friction": 0.3},
+    "obstacles": [
+        {"name": "block", "kind": "step", "height": 0.1, "place": [2.0, 0.3], "direction": 1.57,
+         "width": 0.5, "depth": 0.3},
+        {"name": "wall", "kind": "wall", "height": 1.0, "start": [1.0, 0.3], "end": [1.5, 1.0],
+         "thickness": 0.1},
+        {"name": "post", "kind": "circle", "height": 1.0, "centre": [0.5, -0.3], "radius": 0.1},
+        {"name": "box", "kind": "polygon", "height": 1.0,
+         "corners": [[2.2, -0.5], [2.6, -0.5], [2.6, -0.2], [2.2, -0.2]]},
+    ],
+}  # fmt: skip
+DRIVES = {"actuator": {"duration": 2.5, "saturation": 20.0, "dead_zone": 1.0}}
+FREE = {"path.heading": "free", "path.headings": [0.0, 0.2, 0.0], "robot": {"name": "loc8"}}
+PROFILE = {"profile": {"places": [0.0, 1.5], "speeds": [0.3, 0.4]}}
+
+
+@cache
+def bases() -> dict[str, Problem]:
+    """Problems in which keys bind."""
+    straight = Problem.model_validate({**STRAIGHT})
+    lateral = load_problem(PROBLEMS / "smdw" / "scenario_1_lateral.toml")
+    return {
+        "search": lateral,
+        "drives": lateral.replace({**DRIVES, "obstacles": None}),
+        "path": straight,
+        "free": straight.replace(FREE),
+        "profile": straight.replace(PROFILE),
+        "climb": load_problem(PROBLEMS / "smdw" / "step_5cm.toml"),
+        "ramp": load_problem(PROBLEMS / "powerbot" / "experiment_4.toml"),
+        "encounters": load_problem(PROBLEMS / "powerbot" / "experiment_3.toml"),
+    }
+
+
+def motion(s: Solution) -> Any:
+    """When the robot is where, and how its wheels stand."""
+    if s.trajectory is None:
+        return s.faults
+    state = s.trajectory.at(np.linspace(0.0, s.trajectory.duration, 9))
+    return s.duration, state.pose.tolist(), state.wheel_angles.tolist()
+
+
+def told(s: Solution) -> Any:
+    """What is said of it."""
+    return s.status
+
+
+def margins(s: Solution) -> Any:
+    return s.margins
+
+
+def cost(s: Solution) -> Any:
+    return s.cost
+
+
+def notes(s: Solution) -> Any:
+    """What the system of a section adds."""
+    return None if s.details is None else s.details.notes
+
+
+def picture(s: Solution) -> Any:
+    """What the legend of the picture says."""
+    assert s.path is not None
+    return path_figure(s, s.path).axes[0].get_legend_handles_labels()[1]
+
+
+@dataclass(frozen=True)
+class Row:
+    """Another ``value`` in the problem ``base`` changes ``output``, or is refused with words;
+    ``key`` where one other than the row's is set."""
+
+    base: str
+    value: Any
+    output: Callable[[Solution], Any] | str
+    key: str | None = None
+
+
+ROWS = {
+    "infeasible": Row("search", "it is not", told),
+    "robot.name": Row("free", "loc8-smdw", told),
+    "robot.file": Row("path", str(DATA / "small-differential.toml"), motion),
+    "robot.body": Row("search", [0.0, 0.0, 0.4], margins, "robot.body.cog"),
+    "robot.wheels": Row("search", 0.12, motion, "robot.wheels.all.radius"),
+    "robot.motors": Row("search", 6.0, motion, "robot.motors.all.speed"),
+    "robot.pivots": Row("search", 1.0, "robot.pivots", "robot.pivots.none.mass"),
+    "robot.steering": Row("search", [0.0, 1.0], "robot.steering", "robot.steering.none.range"),
+    "robot.skid": Row("search", 0.5, "only with fixed wheels", "robot.skid.effective_track"),
+    "ground.friction": Row("path", 0.03, motion),
+    "ground.ramps.foot": Row("ramp", [-44.63, -31.0], motion, "ground.ramps.0.foot"),
+    "ground.ramps.direction": Row("ramp", -1.5, motion, "ground.ramps.0.direction"),
+    "ground.ramps.length": Row("ramp", 4.0, motion, "ground.ramps.0.length"),
+    "ground.ramps.height": Row("ramp", 0.3, motion, "ground.ramps.0.height"),
+    "ground.ramps.rounding": Row("ramp", 0.6, motion, "ground.ramps.0.rounding"),
+    "ground.grade": Row("ramp", 0.05, told),
+    "obstacles.step.name": Row("path", "kerb", told, "obstacles.block.name"),
+    "obstacles.step.kind": Row("path", "hole", "obstacles", "obstacles.block.kind"),
+    "obstacles.step.height": Row("climb", 0.04, motion, "obstacles.step.height"),
+    "obstacles.step.place": Row("path", [2.0, 0.2], told, "obstacles.block.place"),
+    "obstacles.step.direction": Row("path", 1.2, told, "obstacles.block.direction"),
+    "obstacles.step.width": Row("path", 1.5, told, "obstacles.block.width"),
+    "obstacles.step.depth": Row("path", 0.01, told, "obstacles.block.depth"),
+    "obstacles.wall.name": Row("path", "door", told, "obstacles.wall.name"),
+    "obstacles.wall.kind": Row("path", "post", "obstacles", "obstacles.wall.kind"),
+    "obstacles.wall.height": Row("path", 2.0, picture),
+    "obstacles.wall.start": Row("path", [1.0, 0.2], told),
+    "obstacles.wall.end": Row("path", [1.2, 1.0], told),
+    "obstacles.wall.thickness": Row("path", 0.2, told),
+    "obstacles.circle.name": Row("path", "tree", told, "obstacles.post.name"),
+    "obstacles.circle.kind": Row("path", "ball", "obstacles", "obstacles.post.kind"),
+    "obstacles.circle.height": Row("path", 2.0, picture, "obstacles.post.height"),
+    "obstacles.circle.centre": Row("path", [0.6, -0.3], told, "obstacles.post.centre"),
+    "obstacles.circle.radius": Row("path", 0.2, told, "obstacles.post.radius"),
+    "obstacles.polygon.name": Row("path", "crate", told, "obstacles.box.name"),
+    "obstacles.polygon.kind": Row("path", "ball", "obstacles", "obstacles.box.kind"),
+    "obstacles.polygon.height": Row("path", 2.0, picture, "obstacles.box.height"),
+    "obstacles.polygon.corners": Row(
+        "path", [[2.1, -0.5], [2.6, -0.5], [2.6, -0.2]], told, "obstacles.box.corners"
+    ),
+    "limits.speed": Row("path", 0.5, motion),
+    "limits.safety_speed": Row("path", 0.5, motion),
+    "limits.yaw_rate": Row("path", 0.05, motion),
+    "limits.wheel_speed": Row("search", [9.0, 9.0, 5.0, 9.0], motion),
+    "limits.wheel_acceleration": Row("search", [9.0, 9.0, 5.0, 9.0], motion),
+    "limits.slip": Row("path", False, margins),
+    "limits.slip_share": Row("path", 0.1, motion),
+    "limits.acceleration": Row("path", 0.3, motion),
+    "limits.deceleration": Row("path", 0.3, motion),
+    "limits.tip": Row("path", False, margins),
+    "limits.variant": Row("path", "thesis", margins),
+    "start.pose": Row("search", [0.1, 0.0, 0.0], motion),
+    "start.wheels": Row("search", [0.1, 0.2, 0.3, 0.4], motion),
+    "goal.pose": Row("search", [2.4, 0.76, -1.5], motion),
+    "goal.wheels": Row("search", [0.5, 0.0, 0.0, 0.0], motion),
+    "goal.critical": Row("search", ["front-right"], motion),
+    "space.x": Row("search", [0.0, 2.5], told),
+    "space.y": Row("search", [-0.5, 1.0], told),
+    "spline.free": Row("search", ["p1", "p2"], motion),
+    "objective.kind": Row("search", "duration", cost),
+    "objective.pose_gains": Row("drives", [1.0, 1.0, 1.0], cost),
+    "objective.wheel_gain": Row("drives", 3.0, cost),
+    "objective.wheel_period": Row("search", "pi", told),
+    "objective.wheel_tolerance": Row("drives", 0.01, told),
+    "objective.pose_tolerance": Row("drives", 0.01, told),
+    "actuator.duration": Row("drives", 3.0, motion),
+    "actuator.saturation": Row("drives", 10.0, cost),
+    "actuator.dead_zone": Row("drives", 3.0, cost),
+    "path.points": Row("path", [[0.0, 0.0], [1.0, 0.2], [2.0, 0.0]], motion),
+    "path.file": Row("path", "way.csv", "points or file"),
+    "path.heading": Row("free", "along", 'none, or heading = "free"'),
+    "path.headings": Row("free", [0.0, 0.3, 0.1], motion),
+    "path.spacing": Row("path", "uniform", motion),
+    "path.start_heading": Row("ramp", -3.1, motion),
+    "path.start_rate": Row("ramp", 1.0, motion),
+    "path.goal_heading": Row("ramp", -3.1, motion),
+    "path.goal_rate": Row("ramp", 1.0, motion),
+    "profile.places": Row("profile", [0.0, 1.0], motion),
+    "profile.speeds": Row("profile", [0.3, 0.5], motion),
+    "profile.manner": Row("profile", "least_squares", motion),
+    "climb.step": Row("climb", "kerb", "of kind step: step"),
+    "climb.gap": Row("climb", 0.03, motion),
+    "climb.rank": Row("climb", "margin", motion),
+    "climb.alphas": Row("climb", [0.7], notes),
+    "encounters.appears": Row("encounters", 12.0, notes, "encounters.0.appears"),
+    "encounters.clears_after": Row("encounters", 4.0, notes, "encounters.1.clears_after"),
+    "encounters.distance": Row("encounters", 0.3, notes, "encounters.0.distance"),
+    "printed.length": Row("encounters", 16.0, notes),
+    "printed.time": Row("encounters", 50.0, notes),
+    "printed.unscaled_speed": Row("encounters", 6.0, notes),
+    "printed.unscaled_acceleration": Row("encounters", 21.0, notes),
+    "printed.unscaled_deceleration": Row("encounters", 13.0, notes),
+    "printed.sliding_speed": Row("encounters", 2.0, notes),
+    "printed.fitted": Row("encounters", False, notes),
+    "printed.residuals": Row("encounters", {"length": 0.1}, notes),
+}
+
+
+def keys(model: type[BaseModel], before: str = "") -> Iterator[str]:
+    """Dotted keys of a kind of file; elements of a union of models are named by their kind."""
+    for name, field in model.model_fields.items():
+        key = before + (field.alias or name)
+        if key == "source":
+            continue
+        section = key if key in SECTIONS else None
+        models = [entry(section).SCHEMAS[section]] if section else list(_models(field.annotation))
+        if not models:
+            yield key
+        for one in models:
+            kind = one.model_fields.get("kind")
+            tag = f"{get_args(kind.annotation)[0]}." if kind and len(models) > 1 else ""
+            yield from keys(one, f"{key}.{tag}")
+
+
+def solved(problem: Problem) -> Solution:
+    """Short searches where a swarm is needed; everything is the same at every call."""
+    if problem.actuator is None:
+        return solve(problem)
+    return solve(problem, optimizer="pso", budget=Budget(evaluations=60))
+
+
+@cache
+def before(base: str) -> Solution:
+    return solved(bases()[base])
+
+
+def test_every_key_has_a_row() -> None:
+    known = set(keys(Problem))
+    assert known - EXEMPT == set(ROWS)
+    assert known >= EXEMPT
+
+
+@pytest.mark.parametrize("key", ROWS)
+def test_another_value_changes_the_output_or_is_refused(key: str) -> None:
+    row = ROWS[key]
+    changes = {row.key or key: row.value}
+    if key == "robot.file":
+        changes["robot.name"] = None
+    if isinstance(row.output, str):
+        with pytest.raises((ProblemError, ArgumentError)) as caught:
+            bases()[row.base].replace(changes)
+        assert row.output in str(caught.value)
+    else:
+        changed = bases()[row.base].replace(changes)
+        assert row.output(solved(changed)) != row.output(before(row.base))
+
+
+def test_points_of_a_file_are_the_points(tmp_path: Any) -> None:
+    file = tmp_path / "way.csv"
+    file.write_text("x,y,yaw\n0,0,0\n1,0.1,0.2\n2,0,0\n")
+    changes = {"path.points": None, "path.file": str(file)}
+    assert motion(solve(bases()["path"].replace(changes))) == motion(before("path"))
+    changes["path.headings"] = None
+    assert motion(solve(bases()["free"].replace(changes))) == motion(before("free"))
+    with pytest.raises(ProblemError, match="columns x, y"):
+        bases()["path"].replace({"path.points": None, "path.file": str(tmp_path / "none.csv")})
