@@ -17,12 +17,13 @@ from smdw_problems import ROOT
 
 from trajopt.errors import ArgumentError, ProblemError
 from trajopt.optimize.base import Budget
-from trajopt.pipeline import Solution, solve
+from trajopt.pipeline import solve
 from trajopt.problem import Problem, load_problem
 from trajopt.problem.extensions import SECTIONS, entry
 from trajopt.report.path_picture import path_figure
 from trajopt.robots.robot import DATA
 from trajopt.schema import _models
+from trajopt.solution import Solution
 
 EXEMPT = {"title", "robot.about"}  # for people
 PROBLEMS = ROOT / "problems"

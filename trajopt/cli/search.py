@@ -24,7 +24,7 @@ from trajopt.errors import ArgumentError
 if TYPE_CHECKING:
     from trajopt.arrays import Array
     from trajopt.optimize.base import Budget
-    from trajopt.pipeline import Solution
+    from trajopt.solution import Solution
 
 Out = Annotated[
     Path | None, typer.Option("--out", help="folder for trajectory, summary and pictures")
