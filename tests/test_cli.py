@@ -6,9 +6,12 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pandas as pd
 import pytest
 from smdw_problems import ROOT
+
+from trajopt.problem import load_problem
 
 SCENARIO = "problems/smdw/scenario_1_forward35.toml"
 RUN = "from trajopt.cli import main; main()"
@@ -117,8 +120,39 @@ def test_plan_ranks_configurations_and_writes_run_folders(tmp_path):
     assert done.returncode == 0, done.stderr
     folders = sorted(f.name for f in tmp_path.iterdir())
     assert len(folders) >= 3
-    assert json.loads((tmp_path / folders[0] / "summary.json").read_text())["holds"]
     assert "lateral" in done.stdout
+    for name in folders:
+        assert json.loads((tmp_path / name / "summary.json").read_text())["holds"]
+        problem = load_problem(tmp_path / name / "problem.toml")
+        assert problem.robot.name == "loc8-smdw"
+        assert problem.scene == load_problem(ROOT / "problems/smdw/step_5cm.toml").scene
+
+
+@pytest.mark.parametrize("file", ["smdw/table_5_3", "smdw/table_5_3_1s", "powerbot/experiment_6"])
+def test_every_command_takes_problem_and_folder_of_every_kind(file, tmp_path):
+    """Searched, through drives, given with a profile: explain, export and compare, with a log of
+    the plan itself."""
+    path = f"problems/{file}.toml"
+    known = load_problem(ROOT / path).infeasible is not None
+    run = trajopt("solve", path, "--out", tmp_path / "run", "--no-pictures")
+    assert run.returncode == int(known), run.stderr
+    table = pd.read_csv(tmp_path / "run" / "trajectory.csv")
+    table["v_m_s"] = np.hypot(table["vx_m_s"], table["vy_m_s"])
+    columns = {"t_s": "t", "x_m": "x", "y_m": "y", "yaw_rad": "yaw", "v_m_s": "v"}
+    table[list(columns)].rename(columns=columns).to_csv(tmp_path / "log.csv", index=False)
+    told = {}
+    for plan in (path, tmp_path / "run"):
+        orders = tmp_path / "orders.csv"
+        for arguments in (("explain", plan), ("export", plan, "--out", orders)):
+            done = trajopt(*arguments)
+            assert done.returncode == 0, done.stderr
+        assert (
+            len(pd.read_csv(orders).columns) == 1 + table.columns.str.endswith("_angle_rad").sum()
+        )
+        told[plan] = trajopt("compare", plan, tmp_path / "log.csv").stdout
+        assert "speed error" in told[plan]
+        assert "0.0000 m/s" in told[plan]
+    assert len(set(told.values())) == 1
 
 
 @pytest.mark.parametrize("group", ["sweep", "bench"])

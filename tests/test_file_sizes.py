@@ -16,7 +16,6 @@ LONGER = {
     "trajopt/optimize/base.py": "the contract of optimizers, to be read as a whole",
     "trajopt/optimize/ipopt.py": "the one file that may import casadi",
     "trajopt/optimize/swarm.py": "one compiled kernel and its readable twin, side by side",
-    "trajopt/pipeline.py": "solve, time, follow, plan and validate on one page",
     "trajopt/report/run_folder.py": "writing and reading a run folder, kept in step",
 }
 

@@ -29,13 +29,14 @@ if TYPE_CHECKING:
     from trajopt.optimize.base import Budget, OptimizeResult, Status
     from trajopt.optimize.search import minimize
     from trajopt.paths.path import Path
-    from trajopt.pipeline import Solution, solve, validate
+    from trajopt.pipeline import solve, validate
     from trajopt.problem import Problem, load_problem
     from trajopt.refine.jerk import limit_jerk
     from trajopt.refine.path import optimize_path
     from trajopt.refine.profile import follow
     from trajopt.robots.robot import Robot, robot, robot_names
     from trajopt.simulate.check import ValidationReport
+    from trajopt.solution import Solution
     from trajopt.sweeps.sweeps import sweep
     from trajopt.timing.scaling import time_scale
     from trajopt.timing.trajectory import State, Trajectory
@@ -58,7 +59,7 @@ _HOME = {
     "Robot": "trajopt.robots.robot",
     "SimulationError": "trajopt.errors",
     "Slip": "trajopt.limits.slip",
-    "Solution": "trajopt.pipeline",
+    "Solution": "trajopt.solution",
     "Speed": "trajopt.limits.speed",
     "SpeedZones": "trajopt.limits.speed_bound",
     "State": "trajopt.timing.trajectory",

@@ -15,9 +15,10 @@ import numpy as np
 
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import Budget
-from trajopt.pipeline import Solution, solve, validate
+from trajopt.pipeline import solve, validate
 from trajopt.problem import Problem, load_problem
 from trajopt.simulate.check import ValidationReport
+from trajopt.solution import Solution
 from trajopt.sweeps.cases import Case
 
 ENGINES = ("none", "pybullet", "mujoco")

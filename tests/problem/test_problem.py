@@ -195,3 +195,10 @@ def test_errors_come_back_from_worker_processes(error):
     assert type(back) is type(error)
     assert str(back) == str(error)
     assert back.__dict__ == error.__dict__
+
+
+def test_replace_leaves_the_callers_tables_alone(scenario):
+    table = {"name": "post", "kind": "circle", "height": 1.0, "centre": [9.0, 0.0], "radius": 0.1}
+    moved = scenario.replace({"obstacles": [table], "obstacles.0.radius": 0.2})
+    assert moved.obstacles[0].radius == 0.2
+    assert table["radius"] == 0.1

@@ -8,10 +8,10 @@ from smdw_problems import smdw_problem
 
 import trajopt
 from tests.recordings import made_up
-from trajopt.pipeline import Solution
 from trajopt.problem import Problem
 from trajopt.simulate.check import ValidationReport
 from trajopt.simulate.engine import Hit
+from trajopt.solution import Solution
 from trajopt.systems.smdw.thesis import through_drives
 
 

@@ -13,12 +13,12 @@ from matplotlib.image import imread
 
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import History, Status
-from trajopt.pipeline import Solution
 from trajopt.report.convergence_picture import convergence_figure
 from trajopt.report.path_picture import path_figure
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.profile_picture import band_times, limit_use, profile_figure
 from trajopt.simulate.check import ValidationReport
+from trajopt.solution import Solution
 
 
 def assert_shows_something(file: Path) -> None:

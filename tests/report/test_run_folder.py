@@ -19,7 +19,6 @@ import trajopt
 from tests.report.conftest import problem_file
 from trajopt.errors import ArgumentError, MissingDependencyError, ProblemError
 from trajopt.optimize.search import optimizer_names
-from trajopt.pipeline import Solution
 from trajopt.provenance import commit, versions
 from trajopt.report.files import as_toml, finite
 from trajopt.report.run_folder import (
@@ -33,6 +32,7 @@ from trajopt.report.run_folder import (
 )
 from trajopt.robots.robot import DATA
 from trajopt.simulate.check import ValidationReport
+from trajopt.solution import Solution
 from trajopt.systems.smdw.entry import WHEELS
 
 ALL = ("exact", "through_actuators", "violated", "without_motion")

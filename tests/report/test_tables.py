@@ -6,10 +6,10 @@ import pytest
 from rich.console import Console
 from rich.table import Table
 
-from trajopt.pipeline import Solution
 from trajopt.report.tables import solution_table, validation_table
 from trajopt.robots import robot
 from trajopt.simulate.check import ValidationReport
+from trajopt.solution import Solution
 
 
 def text_of(table: Table) -> str:

@@ -11,8 +11,9 @@ from smdw_problems import SMDW, smdw_problem
 
 from benchmarks.theses.smdw_study import terminal_cost
 from tests.systems.golden_data import ROOT, Figures, rows_of
-from trajopt.pipeline import Solution, solve, validate
+from trajopt.pipeline import solve, validate
 from trajopt.problem import load_problem
+from trajopt.solution import Solution
 from trajopt.systems.smdw.climbing import DEFAULT_WHEEL, FITTED_WHEEL, forward_alphas
 from trajopt.systems.smdw.entry import WHEELS
 from trajopt.systems.smdw.geometry import contact_offset

@@ -27,6 +27,7 @@ def explain(
     engine: Annotated[str, typer.Option(help="auto, toppra or compiled")] = "auto",
 ) -> None:
     """Show which limit binds on which stretch, and what a 1 % change of each limit would save."""
+    from trajopt.timing.engines import ENGINES
     from trajopt.timing.sensitivity import sensitivities
 
     trajectory = _timed(plan, set_, engine)
@@ -44,9 +45,13 @@ def explain(
     limits = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("limit", "least margin", "1 % more saves (s)"):
         limits.add_column(column, justify="left" if column == "limit" else "right")
-    margins = trajectory.margins()
-    for name, saved in sorted(sensitivities(trajectory).items(), key=lambda item: -item[1]):
-        limits.add_row(name, f"{max(margins[name], 0.0):.2%}", f"{saved:.4f}")
+    optimal = trajectory.engine in ENGINES  # only of those one can say what a limit costs
+    savings = sensitivities(trajectory) if optimal else {}
+    for name, margin in sorted(
+        trajectory.margins().items(), key=lambda item: (-savings.get(item[0], 0.0), item[1])
+    ):
+        saved = f"{savings[name]:.4f}" if optimal else "not time-optimal"
+        limits.add_row(name, f"{margin if margin < -1e-9 else max(margin, 0.0):.2%}", saved)
     console.print(limits)
 
 

@@ -24,7 +24,7 @@ from trajopt.errors import ArgumentError
 if TYPE_CHECKING:
     from trajopt.arrays import Array
     from trajopt.optimize.base import Budget
-    from trajopt.pipeline import Solution
+    from trajopt.solution import Solution
 
 Out = Annotated[
     Path | None, typer.Option("--out", help="folder for trajectory, summary and pictures")
@@ -57,9 +57,7 @@ def solve(
 
     loaded = load_problem(problem, overrides(set_))
     optimizer = _of_plugin(optimizer, plugin)
-    budget = None
-    if loaded.job.name != "path" or (evaluations, seconds, target) != (None, None, None):
-        budget = _budget(evaluations, seconds, target)
+    budget = _budget(evaluations, seconds, target)
     start = None if x0 is None else _searched(x0)
     with Bar(f"{optimizer}", None if budget is None else budget.evaluations) as bar:
         solution = solve_problem(
@@ -165,9 +163,12 @@ def _of_plugin(optimizer: str, plugin: Path | None) -> str:
     )
 
 
-def _budget(evaluations: int | None, seconds: float | None, target: float | None) -> Budget:
+def _budget(evaluations: int | None, seconds: float | None, target: float | None) -> Budget | None:
+    """None where nothing is asked for."""
     from trajopt.optimize.base import DEFAULT_EVALUATIONS, Budget
 
     if evaluations is None and seconds is None:
+        if target is None:
+            return None
         evaluations = DEFAULT_EVALUATIONS
     return Budget(evaluations, seconds, target)

@@ -133,7 +133,7 @@ def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
 
 def compare_log(trajectory: Trajectory, file: str | FilePath) -> Comparison:
     """Compare a plan with the log of what the robot did: CSV with columns t, x, y, yaw, v (s, m, m,
-    rad, m/s).
+    rad, m/s; v forward, or in whatever direction a holonomic robot moves).
 
     Speeds are compared at the log's times, headings at equal travelled distance share, the goal by
     place. Raises ArgumentError for a missing column, fewer than two rows, or numbers that are not
@@ -143,7 +143,10 @@ def compare_log(trajectory: Trajectory, file: str | FilePath) -> Comparison:
     t = log[:, 0]
     inside = t <= trajectory.duration
     planned = trajectory.at(np.minimum(t, trajectory.duration))
-    speed = np.where(inside, planned.twist[:, 0], 0.0)
+    forward = planned.twist[:, 0]
+    if trajectory.robot is not None and trajectory.robot.holonomic:
+        forward = np.hypot(*planned.twist[:, :2].T)
+    speed = np.where(inside, forward, 0.0)
     heading = fold(log[:, 3] - planned.pose[:, 2])
     steps = np.hypot(np.diff(log[:, 1]), np.diff(log[:, 2]))
     return Comparison(

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from trajopt.arrays import Array, BoolArray
 from trajopt.optimize.base import FEASIBLE, OptimizeResult, Status
-from trajopt.pipeline import Solution
 from trajopt.report.style import BLUE, GREY, ORANGE, VERMILION, new_figure
+from trajopt.solution import Solution
 
 _DECADES = 1.0  # an axis is logarithmic where its values span more decades than this, chosen
 _FLOOR = 1e-16  # smallest cost drawn on a logarithmic axis: rounding of doubles

@@ -12,7 +12,6 @@ from trajopt.arrays import Array
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.base import OptimizeResult
 from trajopt.paths.path import Path
-from trajopt.pipeline import Solution
 from trajopt.report.ground_plan import (
     draw_robot,
     draw_scene,
@@ -34,6 +33,7 @@ from trajopt.report.style import (
     WIDTH,
     new_figure,
 )
+from trajopt.solution import Solution
 from trajopt.world.crossing import crossings
 
 _MOMENTS = 6  # robot outlines between start and goal, chosen

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
-from trajopt.pipeline import Solution
 from trajopt.report.ground_plan import draw_robot, draw_scene, frame_points, outline
 from trajopt.report.style import (
     BLACK,
@@ -23,6 +22,7 @@ from trajopt.report.style import (
     legend_beside,
     new_figure,
 )
+from trajopt.solution import Solution
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport

@@ -6,13 +6,13 @@ import os
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
-from trajopt.pipeline import Solution
 from trajopt.report.convergence_picture import convergence_figure
 from trajopt.report.files import made_folder
 from trajopt.report.path_picture import path_figure
 from trajopt.report.physics_picture import physics_figure
 from trajopt.report.profile_picture import profile_figure
 from trajopt.report.style import in_style, save_figure
+from trajopt.solution import Solution
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport

@@ -13,7 +13,6 @@ from matplotlib.patches import Patch
 from trajopt.arrays import Array
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.samples import sample_at
-from trajopt.pipeline import MARGIN, Solution
 from trajopt.report.run_folder import binding_shares
 from trajopt.report.style import (
     BLACK,
@@ -28,6 +27,7 @@ from trajopt.report.style import (
     limit_colour,
     new_figure,
 )
+from trajopt.solution import MARGIN, Solution
 from trajopt.timing.trajectory import Trajectory
 
 _SAMPLES = 1200  # times at which curves are drawn, chosen: more than pixels across

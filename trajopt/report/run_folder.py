@@ -23,7 +23,7 @@ from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.terminal import swarm_engine, terminal_objective
 from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
-from trajopt.pipeline import Solution, with_details
+from trajopt.pipeline import with_details
 from trajopt.problem import Problem, load_problem
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import (
@@ -35,6 +35,7 @@ from trajopt.report.files import (
     write_text,
 )
 from trajopt.robots.robot import Robot
+from trajopt.solution import Solution
 from trajopt.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from trajopt.optimize.base import OptimizeResult
-from trajopt.pipeline import Solution
 from trajopt.report.run_folder import binding_shares
 from trajopt.robots.robot import Robot
+from trajopt.solution import Solution
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport

@@ -24,8 +24,8 @@ from trajopt.systems.powerbot.constants import REACTION_TIME, SCAN_TIME, SONAR_R
 from trajopt.systems.powerbot.limits import ThesisSlide, ThesisSlip, ThesisTip
 
 if TYPE_CHECKING:
-    from trajopt.pipeline import Solution
     from trajopt.problem.model import Problem
+    from trajopt.solution import Solution
 
 _CURVATURE_POINTS = 2001  # where the sharpest bend is looked for
 _LONGEST = 10.0  # times the plan's duration, after which an encounter is given up; chosen

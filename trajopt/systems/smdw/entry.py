@@ -13,8 +13,8 @@ from trajopt.world.obstacles import Step
 
 if TYPE_CHECKING:
     from trajopt.optimize.base import Budget, Optimizer
-    from trajopt.pipeline import Solution
     from trajopt.problem.model import Problem
+    from trajopt.solution import Solution
 
 Rank = Literal["duration", "margin", "climb_rate"]
 WHEELS = ("front-left", "front-right", "rear-left", "rear-right")
@@ -109,7 +109,7 @@ def solve(
 
     from trajopt.optimize.given import Given
     from trajopt.optimize.search import minimize
-    from trajopt.pipeline import Solution, search_objective
+    from trajopt.solution import Solution, search_objective
     from trajopt.systems.smdw.planner import plan_climb
 
     chosen = "lattice" if optimizer == "auto" else optimizer
