@@ -66,7 +66,7 @@ def test_text_is_not_numbers():
 
 def test_no_room_has_a_copy():
     copy = re.compile(
-        r"^\w+ = NDArray\[|% \(?(2(\.0)? \* (np|math)\.pi|math\.tau)|def _?rotation\(", re.M
+        r"^\w+ = NDArray\[|% \(?(2(\.0)? \* (np|math)\.pi|math\.tau)|^def _?rotation\(", re.M
     )
     found = {
         f"{file.relative_to(ROOT)}: {match.group()}"

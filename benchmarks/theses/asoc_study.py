@@ -1,4 +1,4 @@
-"""What only the pages beside [attia2017] and [udengaard2008] need: full factorials, tops of sampled
+"""What only the pages beside [udengaard2008] need: full factorials, tops of sampled
 curves, the square at one speed."""
 
 from __future__ import annotations

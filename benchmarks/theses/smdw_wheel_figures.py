@@ -1,4 +1,5 @@
-"""Figures of the SMDW page: outline of the wheel, wheel at a step, set-ups (Figures 4.10, 4.3, 6.9)."""
+"""Figures of the SMDW page: outline of the wheel, wheel at a step, set-ups (Figures 4.10, 4.3,
+6.9)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""validate(trajectory, scene): that robot in that scene, from its own start, with what it touches."""
+"""validate(trajectory, scene): that robot in that scene, from its own start, with what it
+touches."""
 
 from __future__ import annotations
 

@@ -62,7 +62,8 @@ def test_hubs_stand_a_gap_apart() -> None:
 
 
 def test_contact_offsets_of_the_thesis_follow_from_the_sizes_fitted_to_them() -> None:
-    # [guzman2015], Figure 4.10: 4.63 cm at 30 deg, 3.49 cm at 60 deg; flat-faced cam, offset h'(phi)
+    # [guzman2015], Figure 4.10: 4.63 cm at 30 deg, 3.49 cm at 60 deg; flat-faced cam, offset
+    # h'(phi)
     for degrees, printed in ((30.0, 0.0463), (60.0, 0.0349)):
         phi = math.radians(degrees)
         point = outline_point(phi, lambda p: hub_support(0.1029, 0.0554, p))

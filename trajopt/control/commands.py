@@ -1,7 +1,7 @@
 """Wheel speed commands of a robot, and what it did with them.
 
-Commands are speeds of the wheels' rims (m/s) held over one sample time, as [waheed2006] hands them over
-(section 3.5).
+Commands are speeds of the wheels' rims (m/s) held over one sample time, as [waheed2006] hands them
+over (section 3.5).
 """
 
 from __future__ import annotations

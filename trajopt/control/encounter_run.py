@@ -1,4 +1,5 @@
-"""An encounter, driven: the robot along its path, the obstacles of a world, a planner at every scan."""
+"""An encounter, driven: the robot along its path, the obstacles of a world, a planner at every
+scan."""
 
 from __future__ import annotations
 

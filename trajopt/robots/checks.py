@@ -123,7 +123,8 @@ def _wheels(robot: Robot) -> list[Finding]:
 
 
 def _inside(points: Array, corners: Array) -> Array:
-    """(K,): whether points (K, 2) lie in a polygon, by the edges that a ray to the right crosses."""
+    """(K,): whether points (K, 2) lie in a polygon, by the edges that a ray to the right
+    crosses."""
     x, y = points.T[:, :, None]
     (x0, y0), (x1, y1) = corners.T, np.roll(corners, -1, axis=0).T
     crossed = (y0 > y) != (y1 > y)

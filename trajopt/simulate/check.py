@@ -142,7 +142,7 @@ def _driven_robot(trajectory: Trajectory, scene: Scene) -> Robot:
     robot = trajectory.robot
     if not isinstance(robot, Robot):
         raise ArgumentError(
-            "trajectory.robot", robot, "a Robot (robot('loc8'), Robot.load(file) or a builder)"
+            "trajectory.robot", robot, "a Robot (robot('car'), Robot.load(file) or a builder)"
         )
     if not robot.driven:
         raise ArgumentError("trajectory.robot", robot.name, "a robot with a motor")

@@ -53,8 +53,8 @@ class Pose:
 @dataclass(frozen=True)
 class Shape:
     """A convex solid: ``size`` holds half its extents along its own axes (a sphere's three radii, a
-    cylinder's radius twice and half its length along z); a hull has ``corners`` instead. A disc is a
-    wheel that touches with its rim: what of these sizes does that best is the engine's choice."""
+    cylinder's radius twice and half its length along z); a hull has ``corners`` instead. A disc is
+    a wheel that touches with its rim: what of these sizes does that best is the engine's choice."""
 
     kind: Literal["sphere", "cylinder", "disc", "box", "ellipsoid", "hull"]
     size: Vector = (0.0, 0.0, 0.0)

@@ -36,8 +36,8 @@ ENVELOPE_SAMPLES = 1440
 AXIS_SAMPLES, AXIS_REACH = 241, 1.2
 # Points along the axis of a barrel's profile [-] (chosen: sagitta below 0.01 mm on a 40 mm roller).
 BARREL_STATIONS = 13
-# Corners around a solid of revolution [-]. Measured on the LOC8 over 5 m lateral: 24 corners lose
-# 3-12 %, 48 lose 1.5-8 %, 96 lose 1-4 % (Bullet the lower, MuJoCo the upper end).
+# Corners around a solid of revolution [-]. Measured on a Mecanum robot over 5 m lateral: 24 corners
+# lose 3-12 %, 48 lose 1.5-8 %, 96 lose 1-4 % (Bullet the lower, MuJoCo the upper end).
 SIDES = 96
 # Ratio of the two end radii of a truncated-cone roller [-] (chosen; the thesis prints no sizes).
 CONE_RATIO = 0.6

@@ -75,8 +75,9 @@ def open_session(
     picture: Camera | None = None,
 ) -> Iterator[Session]:
     """The robot in the scene at ``pose``, at rest after ``settle`` seconds (None: as long as its
-    springs need); obstacles called ``absent`` are out of the world until moved. Raises ArgumentError for a bad ``settle`` or angles of another number, and what
-    ``Engine.open`` raises."""
+    springs need); obstacles called ``absent`` are out of the world until moved. Raises
+    ArgumentError for a bad ``settle`` or angles of another number, and what ``Engine.open``
+    raises."""
     stand = stage(scene)
     model = build(robot, discs=stand.broken, outline=stand.has_obstacles)
     if settle is None:

@@ -45,8 +45,8 @@ def run_controlled(
     *,
     engine: str = "mujoco",
 ) -> Recording:
-    """Drive the controller's approach, told what ``sense`` measures, from the true ``start`` (m, m, rad) and ``wheels`` (rad), the
-    step standing there, until it has settled."""
+    """Drive the controller's approach, told what ``sense`` measures, from the true ``start`` (m, m,
+    rad) and ``wheels`` (rad), the step standing there, until it has settled."""
     lasts = float(
         controller.reference.times[-1]
     )  # it may take the end of the path slower than the plan

@@ -41,8 +41,8 @@ RANKING_GRID = (
 )
 # Share of trials with both leading wheels up: MuJoCo, friction 0.6-1, 8 N m, wheel angles at the
 # window's middle with errors of 3 mm, 0.5 deg, 0.05 rad: 20 of 20 for each (lateral), 40 of 40
-# (forward 35 and 45 deg); benchmarks/theses/climb.py. Written as (successes + 1)/(trials + 2), so that no
-# rate is certain.
+# (forward 35 and 45 deg); benchmarks/theses/climb.py. Written as (successes + 1)/(trials + 2), so
+# that no rate is certain.
 CLIMB_RATES = {
     (False, 0.035): 41 / 42,
     (False, 0.05): 41 / 42,
