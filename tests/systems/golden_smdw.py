@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
-from smdw_problems import SMDW, smdw_problem
+from tests.smdw_problems import SMDW, smdw_problem
 
 from benchmarks.theses.smdw_study import terminal_cost
 from tests.systems.golden_data import ROOT, Figures, rows_of
