@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -28,3 +29,8 @@ def test_no_robot_is_named(room: str) -> None:
         if NAMES.search(line) and not REGISTRY.match(line)
     ]
     assert not named, "\n".join(named)
+
+
+@pytest.mark.parametrize("file", sorted(PACKAGE.rglob("__init__.py")), ids=lambda f: f.parent.name)
+def test_every_room_says_what_is_in_it(file: Path) -> None:
+    assert ast.get_docstring(ast.parse(file.read_text(encoding="utf-8")))

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
-from tests.smdw_problems import SMDW, smdw_problem
 
 from benchmarks.theses.smdw_study import terminal_cost
+from tests.smdw_problems import SMDW, smdw_problem
 from tests.systems.golden_data import ROOT, Figures, rows_of
 from trajopt.pipeline import solve, validate
 from trajopt.problem import load_problem
