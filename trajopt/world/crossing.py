@@ -15,13 +15,14 @@ from trajopt.paths.path import Path
 from trajopt.world.obstacles import Obstacle
 
 SPACING = 0.005  # m of path parameter between places that are looked at; chosen
+_TOUCH = 1e-9  # m of depth that is rounding; chosen
 _INSIDE = "T********"  # of shapely: the interiors meet, a touch is none
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Between path parameters ``start`` and ``end`` (m) the outline is inside ``obstacle``, at most
-    by ``depth`` (m: its farthest corner from the obstacle's border)."""
+    """Between path parameters ``start`` and ``end`` (m) the outline and ``obstacle`` overlap, at
+    most by ``depth`` (m: how far a corner of one is inside the other)."""
 
     obstacle: str
     start: float
@@ -58,7 +59,7 @@ class Standing:
             outlines = shapely.polygons(outlines_at(places[near], angles[near], self.footprint))
             distance[near] = shapely.distance(solid, outlines)
             for i in np.flatnonzero(distance[near] <= 0.0):
-                distance[near[i]] = -_depth(shapely.intersection(solid, outlines[i]), solid)
+                distance[near[i]] = -_depth(solid, outlines[i])
             least = np.minimum(least, distance)
         return least.reshape(np.shape(x))
 
@@ -82,8 +83,9 @@ def crossings(
         inside = shapely.relate_pattern(solid, outlines, _INSIDE)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
         for first, after in zip(edges[::2], edges[1::2], strict=True):
-            common = shapely.intersection(solid, outlines[first:after])
-            depth = _depth(common, solid)
+            depth = max(_depth(solid, outline) for outline in outlines[first:after])
+            if depth <= _TOUCH:
+                continue
             found.append(Crossing(thing.name, float(s[first]), float(s[after - 1]), depth))
     return tuple(found)
 
@@ -94,7 +96,8 @@ def outlines_at(places: Array, yaw: Array, footprint: Sequence[tuple[float, floa
     return np.asarray(turned + places[:, None, :])
 
 
-def _depth(common: Any, solid: shapely.Polygon) -> float:
-    """Largest distance (m) of a corner of the common parts from the border of ``solid``."""
-    corners = shapely.points(shapely.get_coordinates(common))
-    return float(np.max(shapely.distance(solid.exterior, corners), initial=0.0))
+def _depth(solid: shapely.Polygon, outline: shapely.Polygon) -> float:
+    """How far (m) a corner of what both have in common is inside one of them."""
+    corners = shapely.points(shapely.get_coordinates(shapely.intersection(solid, outline)))
+    inside = [shapely.distance(whole.exterior, corners) for whole in (solid, outline)]
+    return float(np.max(inside, initial=0.0))
