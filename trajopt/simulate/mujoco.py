@@ -20,6 +20,8 @@ from trajopt.simulate.model import Model, cross
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
 
+# Why this process has no graphics, once known: asked a second time, GLFW aborts the process.
+_NO_GRAPHICS: list[str] = []
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -191,15 +193,16 @@ class _Session:
         view.distance = camera.distance
         view.azimuth = 90.0 + math.degrees(camera.yaw)
         view.elevation = math.degrees(camera.pitch)
+        if _NO_GRAPHICS:
+            raise SimulationError(_NO_GRAPHICS[0])
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # what is missing is said below, in one line
                 renderer = self.mujoco.Renderer(self.compiled, camera.height, camera.width)
         except Exception as error:  # the OpenGL back ends raise what they like
             advice = "set MUJOCO_GL=egl or osmesa, or take the picture with pybullet"
-            raise SimulationError(
-                f"mujoco found no graphics for a picture ({error}): {advice}"
-            ) from error
+            _NO_GRAPHICS.append(f"mujoco found no graphics for a picture ({error}): {advice}")
+            raise SimulationError(_NO_GRAPHICS[0]) from error
         try:
             renderer.update_scene(self.data, view)
             image: NDArray[np.uint8] = renderer.render().copy()
