@@ -66,8 +66,11 @@ class SpecBuilder:
 
     def _add_stage(self, stage: Stage) -> None:
         world, light = self.spec.worldbody, [0.2, 0.3, -1.0]
-        world.add_light(pos=[0.0, 0.0, 4.0], dir=light, type=1)
-        texture = self.spec.add_texture(name="checks", type=0, builtin=2, width=256, height=256)
+        world.add_light(pos=[0.0, 0.0, 4.0], dir=light)
+        texture = self.spec.add_texture(
+            name="checks", width=256, height=256, type=self.mujoco.mjtTexture.mjTEXTURE_2D,
+            builtin=self.mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        )  # fmt: skip
         texture.rgb1, texture.rgb2 = [0.95, 0.95, 0.95], [0.62, 0.7, 0.92]
         floor = self.spec.add_material(name="floor", texrepeat=[1, 1], texuniform=True)
         floor.textures[self.mujoco.mjtTextureRole.mjTEXROLE_RGB] = "checks"
