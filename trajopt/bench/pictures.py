@@ -36,7 +36,7 @@ _SHOWN = (
     "pyswarms",
     "cma-es",
     "differential-evolution",
-    "hybrid",
+    "auto",
     "lattice",
     "ipopt",
     "slsqp",
