@@ -261,3 +261,14 @@ def test_command_lists_describes_changes_and_draws(tmp_path: Path) -> None:
         run("--set", "body.mass=3.0")
     with pytest.raises(ArgumentError, match=r"ends in \.png"):
         run("car", "--out", str(tmp_path / "top.pdf"))
+
+
+def test_loc8_is_one_robot_on_two_kinds_of_wheels() -> None:
+    """Body, places, radii and masses of wheels and drives are the same in both files."""
+    mecanum, double = robot("loc8").description, robot("loc8-smdw").description
+    assert mecanum.body == double.body
+    assert [(w.name, w.position, w.radius, w.mass) for w in mecanum.wheels] == [
+        (w.name, w.position, w.radius, w.mass) for w in double.wheels
+    ]
+    assert mecanum.motors == double.motors
+    assert robot("loc8").yaw_inertia == robot("loc8-smdw").yaw_inertia
