@@ -24,7 +24,7 @@ demo: $(READY)  ## solve Table 5.3 and Scenario 1 forward35 (P1 and P2 free: it 
 	$(BIN)/trajopt validate out/demo/scenario_1_forward35 --engine pybullet
 	@echo "Open out/demo/: pictures, trajectory.csv and summary.json of both runs."
 
-test: $(READY)  ## the tests (under 12 minutes on two cores)
+test: $(READY)  ## the tests (under 8 minutes on two cores)
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 test-all: $(READY)  ## the tests, long ones included
