@@ -39,7 +39,7 @@ def read_json(file: FilePath) -> dict[str, Any]:
     else."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise ArgumentError(
             "folder", str(file.parent), f"a folder with {file.name}, written by solve --out"
         ) from None
