@@ -4,8 +4,10 @@ would."""
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
@@ -50,7 +52,38 @@ def test_it_is_solved_drawn_and_driven(file: Path, tmp_path: Path) -> None:
             assert [hit["obstacle"] for hit in report["contacts"]] == []
 
 
+def first_cases(file: Path, folder: Path) -> Path:
+    """The sweep file with the first value of every axis but the first, which keeps two."""
+    sweep = tomllib.loads(file.read_text(encoding="utf-8"))
+    if "problem" in sweep:
+        sweep["problem"] = str((file.parent / sweep["problem"]).resolve())
+    kept = {}
+    for i, (name, axis) in enumerate(sweep.pop("axes").items()):
+        values = axis.get("values") or (axis.get("range") or axis["log"])[:2]
+        kept[name] = {"values": values[: 2 if i == 0 else 1]}
+    tables = {"axes": kept, **{k: v for k, v in sweep.items() if isinstance(v, dict)}}
+    plain = {k: v for k, v in sweep.items() if k not in tables}
+    lines = [f"{key} = {toml(value)}" for key, value in {**plain, **tables}.items()]
+    made = folder / file.name
+    made.write_text("\n".join(lines), encoding="utf-8")
+    return made
+
+
+def toml(value: object) -> str:
+    if isinstance(value, dict):
+        pairs = (f"{json.dumps(key)} = {toml(inner)}" for key, inner in value.items())
+        return "{ " + ", ".join(pairs) + " }"
+    return json.dumps(value)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("file", SWEEPS, ids=lambda file: file.stem)
-def test_a_sweep_file_counts_its_cases(file: Path) -> None:
+def test_a_sweep_file_runs(file: Path, tmp_path: Path) -> None:
+    """Counted whole, and two cases of it run."""
     assert "cases" in run("sweep", "run", str(file), "--dry-run")
+    store = tmp_path / "store"
+    run("sweep", "run", str(first_cases(file, tmp_path)), "--store", str(store))
+    run("sweep", "export", str(store), str(tmp_path / "table.csv"))
+    table = pd.read_csv(tmp_path / "table.csv")
+    assert len(table) == 2
+    assert set(table["status"]) == {"done"}
