@@ -4,10 +4,14 @@ With path speed s' and path acceleration s'', everything a limit needs is linear
 
     body twist           (vx, vy, wz) = twist s'
     its time derivative               = twist s'' + twist_rate s'^2
-    acceleration, body frame          = (twist_x, twist_y, 0) s'' + acceleration_rate s'^2
+    acceleration, body frame          = velocity s'' + acceleration_rate s'^2
+    angular velocity, body frame      = turning s'
+    its time derivative               = turning s'' + turning_rate s'^2
 
-On a slope the body frame is tangent to the surface: x along the heading, z along the surface
-normal.
+The body frame stands on the ground: x along the heading, z along the normal of the posture, which
+on smooth ground is the surface's. The twist is what wheels feel: velocity along x and y, angular
+velocity about z. ``world/posture.py`` makes samples on a ground; the functions here take the path
+as the ground, its lateral axis level.
 """
 
 from __future__ import annotations
@@ -39,6 +43,22 @@ class PathSamples:
         Array  # (N,) geodesic curvature of the track, 1/m (0 where the robot turns on the spot)
     )
     slope: Array  # (N,) rad, positive uphill along the direction of travel
+    velocity: Array  # (N, 3) body-frame velocity of the origin per unit path speed
+    turning: Array  # (N, 3) angular velocity of the body per unit path speed, body frame, rad/m
+    turning_rate: Array  # (N, 3) d turning / ds
+
+    @property
+    def rotation(self) -> Array:
+        """(N, 3, 3): columns are the body's axes in the world, from yaw and gravity."""
+        up = -self.gravity
+        cos, sin, level = np.cos(self.yaw), np.sin(self.yaw), np.hypot(up[:, 1], up[:, 2])
+        zero = np.zeros_like(cos)
+        turn = np.stack([[cos, -sin, zero], [sin, cos, zero], [zero, zero, zero + 1]])
+        c, s = up[:, 2] / level, up[:, 1] / level  # roll
+        tilt = np.stack(
+            [[level, up[:, 0] * -s, up[:, 0] * -c], [zero, c, -s], [up[:, 0], level * s, level * c]]
+        )
+        return np.asarray(np.einsum("ijn,jkn->nik", turn, tilt))
 
 
 _STANDS = 1e-9  # share of the path's rate ds/du below which it stands still
@@ -106,6 +126,15 @@ def along_tangent(s: Array, u: Array, p: list[Array]) -> PathSamples:
     kappa_v = t1[:, 2] * level - t[:, 2] * level1
     zero, one = np.zeros_like(kappa), np.ones_like(kappa)
     yaw = np.unwrap(np.arctan2(t[:, 1], t[:, 0]))
+    turning, turning_rate = np.zeros((2, len(s), 3))
+    turning[:, 2], turning_rate[:, 2] = kappa, kappa1
+    if t[:, 2].any():  # yawing about the vertical, and pitching with the vertical curvature
+        spread = np.sum(t1[:, :2] ** 2 + t[:, :2] * t2[:, :2], axis=1)
+        level2 = (spread - level1**2) / level
+        turning[:, 0], turning[:, 1] = kappa / level * t[:, 2], -kappa_v
+        turning_rate[:, 0] = (kappa1 - kappa * level1 / level) / level * t[:, 2]
+        turning_rate[:, 0] += kappa / level * t1[:, 2]
+        turning_rate[:, 1] = t[:, 2] * level2 - t2[:, 2] * level
     return PathSamples(
         s,
         u,
@@ -118,6 +147,9 @@ def along_tangent(s: Array, u: Array, p: list[Array]) -> PathSamples:
         np.column_stack([-t[:, 2], zero, -level]),
         kappa,
         np.arcsin(np.clip(t[:, 2], -1.0, 1.0)),
+        np.column_stack([one, zero, zero]),
+        turning,
+        turning_rate,
     )
 
 
@@ -150,4 +182,7 @@ def _free_heading(
         np.column_stack([zero, zero, -one]),
         curvature,
         zero,
+        np.column_stack([vx, vy, zero]),
+        np.column_stack([zero, zero, w]),
+        np.column_stack([zero, zero, w1]),
     )

@@ -1,14 +1,16 @@
-"""Ground given by heights on a regular grid, triangulated: from an array, a .npy file or a PNG
-picture.
+"""Ground given by heights on a regular grid.
 
-Each grid cell is split along the diagonal from its lower-left to its upper-right corner. Beyond the
-grid the ground goes on level at the height of its edge.
+Two surfaces pass through the grid's points. Physics, and the wheels of thesis 001, roll on the
+triangulated one: each cell is split along the diagonal from its lower-left to its upper-right
+corner, and beyond the grid the ground goes on level at the height of its edge. Postures follow a
+smooth one, a spline of fifth degree, whose derivatives are continuous up to the fourth.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,9 +18,11 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array, require_finite, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
+from trajopt.world.ground import Line
 
 LARGEST_GRID = 4_000_000  # points; 32 MB as doubles, a 40 m square at 2 cm; chosen
 _CHECKS_PER_CELL = 2  # path samples a grid cell when slopes are checked; chosen
+_DEGREE = 5  # of the smooth surface: its fourth derivatives, which steering needs, are continuous
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +38,46 @@ class HeightMap:
     spacing: float
     origin: tuple[float, float] = (0.0, 0.0)
     grade: float = np.pi / 3
+    lines: ClassVar[tuple[Line, ...]] = ()
+    bends: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        _require_grid("terrain.heights", self.heights)
-        require_positive("terrain.spacing", self.spacing, "m between grid points")
-        require_finite("terrain.origin", self.origin, "m")
+        require_grid("ground.heights", self.heights)
+        require_positive("ground.spacing", self.spacing, "m between grid points")
+        require_finite("ground.origin", self.origin, "m")
         if not 0 < self.grade < np.pi / 2:
-            raise ArgumentError("terrain.grade", self.grade, "an angle between 0 and pi/2 rad")
+            raise ArgumentError("ground.grade", self.grade, "an angle between 0 and pi/2 rad")
 
     @property
     def size(self) -> tuple[float, float]:
         """Extent in x and y, m."""
         rows, columns = self.heights.shape
         return (columns - 1) * self.spacing, (rows - 1) * self.spacing
+
+    @property
+    def grain(self) -> float:
+        return self.spacing
+
+    def partial(self, x: ArrayLike, y: ArrayLike, i: int, j: int) -> Array:
+        """d^(i+j) h / dx^i dy^j of the smooth surface, which passes through all grid points."""
+        px, py = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
+        rows, columns = self.heights.shape
+        if i > min(_DEGREE, columns - 1) or j > min(_DEGREE, rows - 1):
+            return np.zeros(px.shape)
+        return np.asarray(self._spline.ev(py, px, dx=j, dy=i))
+
+    @cached_property
+    def _spline(self) -> Any:
+        from scipy.interpolate import RectBivariateSpline
+
+        rows, columns = self.heights.shape
+        return RectBivariateSpline(
+            self.origin[1] + self.spacing * np.arange(rows),
+            self.origin[0] + self.spacing * np.arange(columns),
+            self.heights,
+            kx=min(_DEGREE, rows - 1),
+            ky=min(_DEGREE, columns - 1),
+        )
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Height of the triangulated surface, m, at world positions of any shape."""
@@ -67,10 +98,22 @@ class HeightMap:
         return np.where(in_x, slope_x, 0.0), np.where(in_y, slope_y, 0.0)
 
     def check(self, path: Path) -> None:
-        """Raises InfeasibleError with place and angle where a path is steeper than ``grade``."""
+        """Raises InfeasibleError with place where a path leaves the map, or is steeper than
+        ``grade``."""
         count = int(path.length / self.spacing * _CHECKS_PER_CELL) + 2
         s = np.linspace(0.0, path.length, count)
         p = path.position(path.locate(s))
+        low = np.asarray(self.origin)
+        outside = np.any((p[:, :2] < low - 1e-9) | (p[:, :2] > low + self.size + 1e-9), axis=1)
+        if outside.any():
+            i = int(np.argmax(outside))
+            x1, y1 = low + self.size
+            raise InfeasibleError(
+                "ground",
+                float(s[i]),
+                f"the path leaves the height map at ({p[i, 0]:.3g}, {p[i, 1]:.3g}) m; "
+                f"the map covers x {low[0]:g} to {x1:g}, y {low[1]:g} to {y1:g} m",
+            )
         run = np.hypot(*np.diff(p[:, :2], axis=0).T)
         rise = np.abs(np.diff(self.height(p[:, 0], p[:, 1])))
         angle = np.arctan2(rise, np.where(run > 0, run, np.inf))
@@ -110,78 +153,13 @@ class HeightMap:
         )
 
 
-def load_height_map(
-    file: str | FilePath,
-    spacing: float,
-    *,
-    origin: tuple[float, float] = (0.0, 0.0),
-    relief: float | None = None,
-    grade: float = np.pi / 3,
-) -> HeightMap:
-    """Height map from a .npy file (heights in m) or a PNG (grey levels; ``relief`` m is the height
-    of white).
-
-    The first row of a PNG is its upper edge (largest y). Raises ArgumentError, naming the file,
-    where it is missing, empty, no picture or array, not two-dimensional, huge, or not finite.
-    """
-    path = FilePath(file)
-    if not path.is_file():
-        raise ArgumentError("terrain.file", str(path), "an existing .npy or .png file")
-    if path.stat().st_size == 0:
-        raise ArgumentError("terrain.file", str(path), "a file that is not empty")
-    if path.suffix.lower() == ".npy":
-        heights = _from_npy(path)
-    elif path.suffix.lower() == ".png":
-        if relief is None or not np.isfinite(relief):
-            raise ArgumentError(
-                "terrain.relief", relief, "the height of white, m: a PNG has no unit"
-            )
-        heights = _from_png(path) * relief
-    else:
-        raise ArgumentError("terrain.file", str(path), "a name that ends in .npy or .png")
-    _require_grid(f"terrain.file {path.name}", heights)
-    return HeightMap(heights, spacing, origin, grade)
-
-
-def _from_npy(path: FilePath) -> Array:
-    try:
-        mapped = np.load(
-            path, mmap_mode="r", allow_pickle=False
-        )  # a huge file is refused before it is read
-    except (ValueError, EOFError, OSError) as error:
-        raise ArgumentError(
-            "terrain.file", str(path), f"a .npy array of numbers ({error})"
-        ) from error
-    if mapped.dtype.kind not in "fiu":
-        raise ArgumentError(
-            "terrain.file", str(path), f"real numbers (this one holds {mapped.dtype})"
-        )
-    if mapped.ndim == 2 and mapped.size > LARGEST_GRID:
-        _too_large(str(path), mapped.shape)
-    return np.array(mapped, dtype=np.float64)
-
-
-def _from_png(path: FilePath) -> Array:
-    """Grey levels 0..1, row 0 at the lower edge."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(path) as picture:
-            if picture.width * picture.height > LARGEST_GRID:
-                _too_large(str(path), (picture.height, picture.width))
-            deep = picture.mode in ("I", "I;16", "I;16B")
-            grey = np.asarray(picture if deep else picture.convert("L"), dtype=np.float64)
-    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
-        raise ArgumentError("terrain.file", str(path), f"a readable PNG ({error})") from error
-    return np.asarray(grey[::-1] / (65535.0 if deep else 255.0))
-
-
-def _require_grid(argument: str, heights: Array) -> None:
+def require_grid(argument: str, heights: Array) -> None:
+    """Raises ArgumentError unless ``heights`` (rows, columns) make a map."""
     shape = np.shape(heights)
     if len(shape) != 2 or min(shape) < 2:
         raise ArgumentError(argument, shape, "heights of shape (rows, columns), at least 2 x 2")
     if shape[0] * shape[1] > LARGEST_GRID:
-        _too_large(argument, shape)
+        too_large(argument, shape)
     if not np.all(np.isfinite(heights)):
         i, j = np.argwhere(~np.isfinite(heights))[0]
         raise ArgumentError(
@@ -189,7 +167,8 @@ def _require_grid(argument: str, heights: Array) -> None:
         )
 
 
-def _too_large(argument: str, shape: tuple[int, ...]) -> None:
+def too_large(argument: str, shape: tuple[int, ...]) -> None:
+    """The ArgumentError for a map with more points than memory should hold."""
     raise ArgumentError(
         argument, shape, f"at most {LARGEST_GRID} grid points; coarsen or crop the map"
     )

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import comb, factorial
+from types import MappingProxyType
+from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, require_finite, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
-from trajopt.paths.samples import sample_at
 from trajopt.paths.spline import SplineBasis
+from trajopt.world.ground import Line
 
 _EDGE_KNOTS = (
     8  # knots across a rounded edge when a path is laid over a ramp; chosen: z within 0.1 mm
 )
+
+
+Edge = Literal["mean", "smooth"]
+_MEANS: Mapping[Edge, int] = MappingProxyType({"mean": 1, "smooth": 3})
 
 
 @dataclass(frozen=True)
@@ -24,8 +32,10 @@ class Ramp:
 
     The foot passes through ``place`` (x, y), m, and the ramp rises along ``direction`` (rad,
     world); beyond it the ground stays at ``height``. Both edges are rounded over ``rounding`` (m),
-    as a robot with that distance between its axles feels them: the height is the mean of the sharp
-    ramp over that length.
+    as a robot with that distance between its axles feels them: with ``edge`` "mean" the height is
+    the mean of the sharp ramp over that length, an arc whose curvature jumps at its ends, and with
+    it the wheel speeds of a robot that crosses it at an angle; with "smooth" the mean is taken
+    three times, each over a third of the length, and third derivatives are continuous too.
     """
 
     place: tuple[float, float]
@@ -33,30 +43,57 @@ class Ramp:
     run: float
     height: float
     rounding: float
+    edge: Edge = "mean"
 
     def __post_init__(self) -> None:
         for name in ("run", "rounding"):
             require_positive(f"ramp.{name}", getattr(self, name), "m")
         require_finite("ramp", [*self.place, self.direction, self.height])
+        if self.edge not in _MEANS:
+            raise ArgumentError("ramp.edge", self.edge, "'mean' or 'smooth'")
 
-    def along(self, x: Array, y: Array) -> Array:
+    def along(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Distance from the foot line along the ramp, m."""
         return np.asarray(
-            (x - self.place[0]) * np.cos(self.direction)
-            + (y - self.place[1]) * np.sin(self.direction)
+            (np.asarray(x) - self.place[0]) * np.cos(self.direction)
+            + (np.asarray(y) - self.place[1]) * np.sin(self.direction)
         )
 
-    def height_at(self, x: Array, y: Array) -> Array:
+    def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Ground height, m, at world positions."""
-        d, half = self.along(x, y), self.rounding / 2
-        rise = _integral(d + half, self.run) - _integral(d - half, self.run)
-        return np.asarray(self.height * rise / self.rounding)
+        return self.rise(self.along(x, y), 0)
 
+    def rise(self, d: Array, order: int) -> Array:
+        """The height's derivative of that order along the ramp, at distances ``d`` from its
+        foot."""
+        return np.asarray(
+            self.height / self.run * (self._bend(d, order) - self._bend(d - self.run, order))
+        )
 
-def _integral(d: Array, run: float) -> Array:
-    """Integral of the unit ramp clip(d / run, 0, 1) up to d."""
-    inside = np.clip(d, 0.0, run)
-    return inside**2 / (2 * run) + np.maximum(d - run, 0.0)
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """Where derivatives of the height jump."""
+        foot = self.place[0] * np.cos(self.direction) + self.place[1] * np.sin(self.direction)
+        n = _MEANS[self.edge]
+        breaks = (np.arange(n + 1) / n - 0.5) * self.rounding
+        return tuple(
+            Line(self.direction, float(foot + edge + b)) for edge in (0.0, self.run) for b in breaks
+        )
+
+    def _bend(self, d: Array, order: int) -> Array:
+        """max(d, 0), averaged over the rounding; or a derivative of it."""
+        n, half = _MEANS[self.edge], self.rounding / 2
+        power, width = n + 1 - order, self.rounding / n
+        near = np.clip(d, -half, half)  # differences of powers lose digits farther out
+        total = np.zeros_like(near)
+        for k in range(n + 1):
+            t = near + half - k * width
+            value = np.where(t >= 0, np.abs(t) ** max(power, 0), 0.0) / factorial(max(power, 0))
+            total += (-1) ** k * comb(n, k) * value / width**n
+        if power < 0:
+            total = np.zeros_like(near)
+        beyond = (d, np.ones_like(d), np.zeros_like(d))[min(order, 2)]
+        return np.where(d >= half, beyond, np.where(d < -half, 0.0, total))
 
 
 @dataclass(frozen=True)
@@ -65,29 +102,45 @@ class Ramps:
 
     ramps: tuple[Ramp, ...]
     grade: float
+    grain: ClassVar[float] = np.inf
+    bends: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if not 0 < self.grade < np.pi / 2:
-            raise ArgumentError("terrain.grade", self.grade, "an angle between 0 and pi/2 rad")
+            raise ArgumentError("ground.grade", self.grade, "an angle between 0 and pi/2 rad")
 
-    def height(self, x: Array, y: Array) -> Array:
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        return tuple(line for ramp in self.ramps for line in ramp.lines)
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
+        return self.partial(x, y, 0, 0)
+
+    def partial(self, x: ArrayLike, y: ArrayLike, i: int, j: int) -> Array:
         total = np.zeros(np.broadcast(x, y).shape)
         for ramp in self.ramps:
-            total = total + ramp.height_at(x, y)
+            share = np.cos(ramp.direction) ** i * np.sin(ramp.direction) ** j
+            total = total + share * ramp.rise(ramp.along(x, y), i + j)
         return total
 
     def check(self, path: Path) -> None:
         """Raises InfeasibleError where the path is steeper than the robot's grade."""
-        u = np.linspace(path.start, path.end, 16 * (len(path.basis.knots) - 1) + 1)
-        slope = np.abs(sample_at(path, np.zeros_like(u), u).slope)
-        if slope.max() > self.grade * (1 + 1e-9):
-            i = int(np.argmax(slope > self.grade))
-            raise InfeasibleError(
-                "grade",
-                float(path.parameter(u[[i]])[0]),
-                f"the ground is {np.degrees(slope.max()):.3g} deg steep, the robot climbs "
-                f"{np.degrees(self.grade):.3g} deg",
-            )
+        require_grade(path, self.grade)
+
+
+def require_grade(path: Path, grade: float) -> None:
+    """Raises InfeasibleError where a path is steeper than ``grade`` (rad)."""
+    u = np.linspace(path.start, path.end, 16 * (len(path.basis.knots) - 1) + 1)
+    d = path.position(u, 1)
+    slope = np.abs(np.arctan2(d[:, 2], np.hypot(d[:, 0], d[:, 1])))
+    if slope.max() > grade * (1 + 1e-9):
+        i = int(np.argmax(slope > grade))
+        raise InfeasibleError(
+            "grade",
+            float(path.parameter(u[[i]])[0]),
+            f"the ground is {np.degrees(slope.max()):.3g} deg steep, the robot climbs "
+            f"{np.degrees(grade):.3g} deg",
+        )
 
 
 def lay_over(path: Path, ramps: Sequence[Ramp]) -> Path:

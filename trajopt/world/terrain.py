@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.paths.path import Path
+from trajopt.world.ground import Line
 
 
 class Terrain(Protocol):
@@ -25,8 +27,15 @@ class Terrain(Protocol):
 class Flat:
     """Ground as the path has it: level under a 2-D path, the path's own z under a 3-D one."""
 
-    def height(self, x: Array, y: Array) -> Array:
+    lines: ClassVar[tuple[Line, ...]] = ()
+    grain: ClassVar[float] = np.inf
+    bends: ClassVar[bool] = False
+
+    def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         return np.zeros(np.broadcast(x, y).shape)
+
+    def partial(self, x: ArrayLike, y: ArrayLike, i: int, j: int) -> Array:  # noqa: ARG002
+        return self.height(x, y)
 
     def check(self, path: Path) -> None:
         """Every path fits."""

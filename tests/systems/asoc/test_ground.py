@@ -10,7 +10,8 @@ from PIL import Image
 
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
-from trajopt.world.height_map import HeightMap, load_height_map
+from trajopt.world.height_files import load_height_map
+from trajopt.world.height_map import HeightMap
 from trajopt.world.rough import rough_ground
 from trajopt.world.wheel_contact import wheel_contact
 
