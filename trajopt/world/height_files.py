@@ -38,11 +38,11 @@ def load_height_map(
         heights, metres = _from_picture(path)
     else:
         raise ArgumentError("ground.file", str(path), "a name that ends in .npy, .png or .tif")
+    require_grid(f"ground.file {path.name}", heights)
     if metres and relief is not None:
         raise ArgumentError("ground.relief", relief, f"none: {path.name} holds heights in m")
     if not metres and (relief is None or not np.isfinite(relief)):
         raise ArgumentError("ground.relief", relief, "the height of white, m: grey has no unit")
-    require_grid(f"ground.file {path.name}", heights)
     return HeightMap(heights if relief is None else heights * relief, spacing, origin, grade)
 
 

@@ -139,7 +139,7 @@ def bad_files(folder):
         ("missing.npy", "existing"),
         ("empty.npy", "not empty"),
         ("text.npy", "array of numbers"),
-        ("text.png", "readable PNG"),
+        ("text.png", "readable picture"),
         ("a.csv", "ends in"),
         ("nan.npy", "row 0, column 1"),
         ("line.npy", "2 x 2"),
