@@ -58,7 +58,7 @@ def test_what_the_program_is_made_of_changes_as_its_derivatives_say(part: str) -
     here, move = np.array([0.1, -0.2]), np.array([6e-4, -8e-4])
 
     def at(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        table = _linearised(corridor(hill), lambda _: limits, shipped("powerbot"), z, u)
+        table = _linearised(corridor(hill), lambda _: limits, (shipped("powerbot"), None), z, u)
         value, slope = getattr(table, part)
         return value, slope
 

@@ -13,13 +13,16 @@ from pydantic import BaseModel
 
 from trajopt.errors import ProblemError
 from trajopt.limits.slip import Slip
+from trajopt.limits.steering_acceleration import SteeringAcceleration
+from trajopt.limits.steering_rate import SteeringRate
 from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path
-from trajopt.paths.samples import sample_path
+from trajopt.paths.samples import PathSamples, sample_path
 from trajopt.problem.limits import LimitsSection
 from trajopt.robots import Robot, robot
 from trajopt.robots.checks import findings
 from trajopt.robots.description import RobotDescription
+from trajopt.timing.track import track
 
 EXEMPT = {"name", "about", "source"}  # title and comments of the whole robot; set by the loader
 CURVE = Path.through([[0, 0], [1, 0.4], [2, -0.2], [3, 0.5]])
@@ -34,6 +37,21 @@ def _rows(limit: Slip | Tip, one: Robot) -> list[list[float]]:
     return [found.a.tolist(), found.b.tolist(), found.c.tolist()]
 
 
+SLOW = {"steering.0.rate": 3.0, "steering.0.acceleration": 3.0}
+STEERING = (SteeringRate(), SteeringAcceleration())
+
+
+def _steered(one: Robot) -> PathSamples:
+    places = np.array([0.8, 1.9])
+    gentle = Path.through([[0, 0], [2, 0.2], [4, 0]])
+    return track(gentle, one).samples(places, gentle.locate(places))
+
+
+def _steering_rows(limit: SteeringRate | SteeringAcceleration, one: Robot) -> list[list[float]]:
+    found = limit.rows(_steered(one), one)
+    return [found.a.tolist(), found.c.tolist(), found.sd2_max.tolist()]
+
+
 OUTPUTS: dict[str, Callable[[Robot], Any]] = {
     "slip": lambda one: _rows(Slip(0.4), one),
     "tip": lambda one: _rows(Tip(), one),
@@ -45,6 +63,8 @@ OUTPUTS: dict[str, Callable[[Robot], Any]] = {
     "wheel names": lambda one: one.wheel_names,
     "driven": lambda one: one.driven,
     "findings": findings,
+    "steering limits": lambda one: [_steering_rows(limit, one) for limit in STEERING],
+    "steering angles": lambda one: _steered(one).wheels.steering.tolist(),
 }
 
 
@@ -115,6 +135,11 @@ ROWS: dict[str, Row] = {
     "steering.wheels": Row(
         "swerve", "steering.0.wheels", (["front-left"], ["rear-left"]), refused="each once"
     ),
+    "steering.rate": Row("car", "steering.0.rate", (1.0, 2.0), "steering limits", SLOW),
+    "steering.acceleration": Row(
+        "car", "steering.0.acceleration", (1.0, 2.0), "steering limits", SLOW
+    ),
+    "steering.rule": Row("car", "steering.0.rule", ("ackermann", "parallel"), "steering angles"),
     "steering.range": Row("car", "steering.0.range", ([-0.4, 0.4], [-0.3, 0.3]), "findings"),
     "skid.effective_track": Row("powerbot", "skid.effective_track", (0.5, 0.8), "rates", SKID),
 }

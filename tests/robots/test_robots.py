@@ -141,7 +141,7 @@ def test_skid_steering_is_a_differential_drive_of_its_effective_track() -> None:
     ("found", "twist", "words"),
     [
         (skid().replace({"skid": None}), [0.5, 0.0, 0.3], r"give \[skid\] with an effective track"),
-        (robot("car"), [0.5, 0.0, 0.3], "front-left, front-right"),
+        (robot("car"), [0.5, 0.2, 0.3], "leave its heading to the direction of travel"),
         (robot("powerbot"), [0.5, 0.2, 0.0], "leave its heading to the direction of travel"),
     ],
     ids=["skid", "car", "powerbot"],

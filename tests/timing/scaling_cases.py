@@ -40,7 +40,15 @@ def rear_cog_robot(friction_height: float = 0.215) -> Robot:
     )
 
 
-ROBOTS = {"loc8": robot("loc8"), "rear_cog": rear_cog_robot()}
+ROBOTS = {"loc8": robot("loc8"), "rear_cog": rear_cog_robot(), "swerve": robot("swerve")}
+
+
+def robot_for(name: str, shape: str) -> Robot:
+    """One that the limit ``name`` acts on and that drives the path ``shape``."""
+    if name.startswith("steering"):
+        return ROBOTS["swerve"]
+    return ROBOTS["loc8" if shape in HOLONOMIC_ONLY else "rear_cog"]
+
 
 _SLALOM = [[0, 0], [1, 0.5], [2, -0.5], [3, 0.3]]
 PATHS = {
@@ -55,10 +63,13 @@ HOLONOMIC_ONLY = {"turning", "sideways"}
 
 ARGUMENTS: dict[str, dict[str, object]] = {
     "acceleration": {"forward": 0.7, "braking": 1.1},
+    "contact": {},
     "slip": {"friction": 0.5},
     "speed": {"largest": 1.5},
     "speed_profile": {"places": (0.0, 0.5, 1.2), "speeds": (0.6, 1.0, 0.5)},
     "speed_zones": {"zones": ((0.3, 0.8, 0.4), (0.6, 1.4, 0.6))},
+    "steering_acceleration": {"largest": 4.0},
+    "steering_rate": {"largest": 0.8},
     "tip": {},
     "wheel_acceleration": {"largest": 15.0},
     "wheel_speed": {"largest": 12.0},

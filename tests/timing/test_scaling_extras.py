@@ -17,6 +17,7 @@ from trajopt.timing.scaling import rough_duration, time_scale
 from trajopt.timing.segments import segment_factors
 from trajopt.timing.sensitivity import sensitivities
 from trajopt.timing.stages import fine_rows
+from trajopt.timing.track import track
 
 DRIVE = [limit("speed", largest=1.0), limit("acceleration", forward=0.5, braking=1.0)]
 
@@ -56,7 +57,7 @@ def test_a_rough_duration_is_near_the_exact_one():
         exact = time_scale(PATHS[shape], limits, robot=ROBOTS["rear_cog"]).duration
         rough = rough_duration(PATHS[shape], limits, robot=ROBOTS["rear_cog"], gridpoints=40)
         assert rough == pytest.approx(exact, rel=0.03)
-        fine = rough_duration(PATHS[shape], limits, robot=ROBOTS["rear_cog"], gridpoints=1000)
+        fine = rough_duration(PATHS[shape], limits, robot=ROBOTS["rear_cog"], gridpoints=800)
         assert fine == pytest.approx(exact, rel=1e-3)
     # A straight line under bounds alone: both grids hold the bang-bang time.
     assert rough_duration(PATHS["straight"], DRIVE) == pytest.approx(
@@ -77,7 +78,7 @@ def test_segments_lie_between_linear_and_the_optimum():
         assert segments.engine == "segments"
         assert min(segments.margins().values()) >= -1e-9
         assert segments.duration >= best.duration * (1 - 1e-6)
-        fine = fine_rows(path, segments.u, limits, robot)
+        fine = fine_rows(track(path, robot), segments.u, limits)
         factors = segment_factors(path, fine)
         knots = np.searchsorted(segments.u, path.basis.knots)
         for k, factor in enumerate(factors):
@@ -93,7 +94,7 @@ def test_segment_factors_follow_a_given_profile():
     path = Path.through([[0, 0], [2, 0], [3, 0], [6, 0]], knots=[0.0, 1.0, 2.0, 3.0])
     profile = limit("speed_profile", places=(0.0, 6.0), speeds=(0.5, 2.0))
     u = np.linspace(0, 3, 301)
-    factors = segment_factors(path, fine_rows(path, u, [profile], None))
+    factors = segment_factors(path, fine_rows(track(path), u, [profile]))
     dense = np.linspace(0, 3, 3001)
     ratio = path.rate(dense) / np.interp(path.parameter(dense), [0, 6], [0.5, 2.0])
     expected = [ratio[i * 1000 : (i + 1) * 1000 + 1].max() for i in range(3)]

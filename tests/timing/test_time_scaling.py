@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scaling_cases import (
     ARGUMENTS,
-    HOLONOMIC_ONLY,
     PATHS,
     ROBOTS,
     limit,
     random_limits,
     random_path,
+    robot_for,
 )
 
 from trajopt.errors import ArgumentError, InfeasibleError
@@ -91,11 +91,18 @@ def test_circle_is_driven_at_the_speed_friction_allows(engine):
 @pytest.mark.parametrize("shape", PATHS)
 @pytest.mark.parametrize("name", LIMITS)
 def test_every_limit_on_every_path_keeps_its_margin(name, shape, engine):
-    robot = ROBOTS["loc8" if shape in HOLONOMIC_ONLY else "rear_cog"]
+    robot = robot_for(name, shape)
     limits = [limit(name)]
     if name not in ("speed", "speed_zones", "speed_profile"):
         limits.append(limit("speed", name="cap", largest=3.0))
-    if name in ("speed", "speed_zones", "speed_profile", "wheel_speed", "yaw_rate"):
+    if name in (
+        "speed",
+        "speed_zones",
+        "speed_profile",
+        "wheel_speed",
+        "yaw_rate",
+        "steering_rate",
+    ):
         limits.append(limit("acceleration", name="push"))
     if name == "speed_zones":
         limits.append(limit("speed", name="cap", largest=3.0))

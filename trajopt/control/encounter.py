@@ -15,7 +15,6 @@ import numpy as np
 from trajopt.arrays import Array, require_finite, require_not_negative, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit, Rows
-from trajopt.paths.samples import sample_path
 from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
@@ -156,7 +155,7 @@ def course(
     """
     count = max(int(np.ceil(trajectory.path.length / _SPACING)) + 1, 3)
     s = np.linspace(0.0, trajectory.path.length, count)
-    samples = sample_path(trajectory.path, s)
+    samples = trajectory.track.samples(s, trajectory.path.locate(s))
     square = np.interp(s, trajectory.s, trajectory.sd**2)
     rows = [
         limit.rows(samples, trajectory.robot)

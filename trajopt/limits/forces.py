@@ -1,9 +1,9 @@
 """Forces between robot and ground, as functions that are affine in (s'', s'^2).
 
 All forces are per unit mass. With the acceleration of the centre of gravity and gravity resolved in
-the body frame, the ground must supply f = acceleration - gravity; it acts at the centre of gravity,
-a height h above the contacts. Left out: wheel inertia, rolling resistance, and the pitching and
-rolling inertia of the body.
+the body frame, the ground must supply f = acceleration - gravity and the moment M = I W' + W x I W
+about the centre of gravity, a height h above the contacts. Left out: the wheels' own spin, rolling
+resistance, products of inertia.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.robot import STANDARD_GRAVITY, Body
+from trajopt.robots.robot import STANDARD_GRAVITY, Body, Robot
+from trajopt.robots.steering import steering_of
 
 
 @dataclass(frozen=True)
@@ -27,54 +28,104 @@ class Affine:
     c: Array
 
     def through(self, matrix: Array) -> Affine:
-        """matrix @ value, for a matrix (M, K)."""
-        return Affine(self.a @ matrix.T, self.b @ matrix.T, self.c @ matrix.T)
+        """matrix @ value, for a matrix (M, K), or one a place (N, M, K)."""
+        if matrix.ndim == 2:
+            return Affine(self.a @ matrix.T, self.b @ matrix.T, self.c @ matrix.T)
+        parts = (np.einsum("nmk,nk->nm", matrix, part) for part in (self.a, self.b, self.c))
+        return Affine(*parts)
+
+    def __getitem__(self, which: slice) -> Affine:
+        """Some of its columns."""
+        return Affine(self.a[:, which], self.b[:, which], self.c[:, which])
+
+    def __add__(self, other: Affine) -> Affine:
+        return Affine(self.a + other.a, self.b + other.b, self.c + other.c)
+
+    def __sub__(self, other: Affine) -> Affine:
+        return Affine(self.a - other.a, self.b - other.b, self.c - other.c)
+
+    def __mul__(self, factor: Array | float) -> Affine:
+        return Affine(self.a * factor, self.b * factor, self.c * factor)
+
+    @classmethod
+    def beside(cls, *parts: Affine) -> Affine:
+        """Columns of all parts."""
+        columns = ([getattr(p, k) for p in parts] for k in "abc")
+        return cls(*(np.hstack(c) for c in columns))
+
+    def at(self, sdd: Array, sd2: Array) -> Array:
+        """(N, K): values at s'' (N,) and s'^2 (N,)."""
+        return np.asarray(self.a * sdd[:, None] + self.b * sd2[:, None] + self.c)
 
 
 def specific_force(path: PathSamples, body: Body) -> Affine:
     """(N, 3): acceleration of the centre of gravity minus gravity, m/s^2, body frame, z along the
     normal.
 
-    A centre of gravity at (x, y) off the body origin adds wz' x r and the centripetal -wz^2 r.
+    A centre of gravity at r off the body origin adds W' x r and W x (W x r).
     """
-    x, y, _ = body.cog
-    zero, wz, wz1 = np.zeros(len(path.s)), path.twist[:, 2], path.twist_rate[:, 2]
-    a = np.column_stack([path.twist[:, 0] - wz * y, path.twist[:, 1] + wz * x, zero])
-    b = path.acceleration_rate + np.column_stack([-wz1 * y - wz**2 * x, wz1 * x - wz**2 * y, zero])
+    r = np.asarray(body.cog, dtype=np.float64)
+    w = path.turning
+    a = path.velocity + _cross(w, r)
+    b = path.acceleration_rate + _cross(path.turning_rate, r) + _cross(w, _cross(w, r))
     return Affine(a, b, -STANDARD_GRAVITY * path.gravity)
 
 
-def ground_wrench(path: PathSamples, body: Body) -> Affine:
-    """(N, 3): force x, y (m/s^2) and yaw moment (m^2/s^2) about the centre of gravity, per unit
-    mass."""
-    force = specific_force(path, body)
-    inertia = body.yaw_inertia / body.mass
-    return Affine(
-        np.column_stack([force.a[:, :2], inertia * path.twist[:, 2]]),
-        np.column_stack([force.b[:, :2], inertia * path.twist_rate[:, 2]]),
-        np.column_stack([force.c[:, :2], np.zeros(len(path.s))]),
-    )
+def ground_moment(path: PathSamples, body: Body) -> Affine:
+    """(N, 3): moment about the centre of gravity that the ground must supply, per unit mass,
+    m^2/s^2, body frame."""
+    inertia = np.array([body.roll_inertia, body.pitch_inertia, body.yaw_inertia]) / body.mass
+    w = path.turning
+    b = path.turning_rate * inertia + _cross(w, w * inertia)
+    return Affine(w * inertia, b, np.zeros_like(w))
 
 
-def contact_arms(body: Body) -> Array:
-    """(C, 2): contact points relative to the centre of gravity, m."""
-    contacts: Array = np.asarray(body.contacts, dtype=np.float64).reshape(-1, 2)
-    return contacts - np.asarray(body.cog[:2], dtype=np.float64)
+def load_demand(path: PathSamples, body: Body) -> Affine:
+    """(N, 3): what the loads N of the contacts, at x, y from the centre of gravity, must sum to: sum
+    N, sum x N, sum y N."""
+    h, force = body.cog[2], specific_force(path, body)
+    demand = force.through(np.array([[0.0, 0.0, 1.0], [-h, 0.0, 0.0], [0.0, -h, 0.0]]))
+    if not path.turning[:, :2].any() and not path.turning_rate[:, :2].any():
+        return demand  # the body neither pitches nor rolls
+    moment = ground_moment(path, body)
+    return demand + moment.through(np.array([[0.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]))
 
 
-def contact_loads(path: PathSamples, body: Body) -> Affine:
-    """(N, C): normal force on every contact, m/s^2 (times the mass: N).
+def contact_points(path: PathSamples, robot: Robot) -> Array:
+    """(K, 2), or (N, K, 2) where castors swivel: where the wheels stand in the body frame, m."""
+    if not len(steering_of(robot).castors) or path.wheels is None:
+        return np.asarray(robot.body.contacts, dtype=np.float64)
+    return path.wheels.contacts
 
-    Vertical force, pitch and roll balance about the centre of gravity give three equations, sum N =
-    f_z, sum x N = -h f_x, sum y N = -h f_y. Where more contacts share the load, ground and
-    suspension are equally stiff everywhere: the distribution of least norm. Raises ArgumentError
-    when the contacts lie on one line (they cannot hold the body up).
+
+def contact_arms(path: PathSamples, robot: Robot) -> Array:
+    """As ``contact_points``, from the centre of gravity."""
+    return contact_points(path, robot) - np.asarray(robot.body.cog[:2], dtype=np.float64)
+
+
+def contact_loads(path: PathSamples, robot: Robot) -> Affine:
+    """(N, K): normal force on every contact, m/s^2 (times the mass: N).
+
+    Force along the normal, pitch and roll balance give three equations. Where more contacts share
+    the load, ground and suspension are equally stiff everywhere: the distribution of least norm.
+    Raises ArgumentError when the contacts lie on one line (they cannot hold the body up).
     """
-    arms, h = contact_arms(body), body.cog[2]
-    balance = np.vstack([np.ones(len(arms)), arms.T])
-    if np.linalg.matrix_rank(balance) < 3:
+    arms = contact_arms(path, robot)
+    balance = np.concatenate([np.ones((*arms.shape[:-1], 1)), arms], axis=-1)
+    if np.linalg.matrix_rank(balance[0] if balance.ndim == 3 else balance) < 3:
         raise ArgumentError(
-            "robot.body.contacts", body.contacts, "three or more contacts not on one line"
+            "robot.body.contacts", robot.body.contacts, "three or more contacts not on one line"
         )
-    demand = np.array([[0.0, 0.0, 1.0], [-h, 0.0, 0.0], [0.0, -h, 0.0]])
-    return specific_force(path, body).through(np.linalg.pinv(balance) @ demand)
+    return load_demand(path, robot.body).through(least_norm(np.swapaxes(balance, -1, -2)))
+
+
+def least_norm(rows: Array) -> Array:
+    """(..., K, R): pseudo-inverse of matrices (..., R, K) of full rank R <= K."""
+    turned = np.swapaxes(rows, -1, -2)
+    return np.asarray(np.swapaxes(np.linalg.solve(rows @ turned, rows), -1, -2))
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross product of vectors (N, 3), or of vectors and one (3,)."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)

@@ -11,6 +11,7 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
+from trajopt.robots.steering import WheelStates, steering_of
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,39 @@ def by_wheel(
     if values.ndim == 0:
         return float(values), 1.0
     if len(values) != wheels:
-        raise ArgumentError(argument, largest, f"one value, or {wheels}: one a wheel that rolls")
+        raise ArgumentError(argument, largest, f"one value, or {wheels}: one each")
+    if np.isinf(values).all():
+        raise ArgumentError(argument, None, "a value: the robot's file gives none")
     return float(values.min()), values.min() / values
+
+
+def spins(path: PathSamples, robot: Robot) -> tuple[Array, Array]:
+    """(N, W): rates of the wheels of ``robot.wheels`` per unit path speed, rad/m, and their
+    derivative along the path; where samples hold no wheel states, of castors as they are drawn.
+
+    Raises ArgumentError for a robot with steered wheels and samples without wheel states.
+    """
+    wheels, steering = path.wheels, steering_of(robot)
+    if wheels is not None:
+        return wheels.spin[:, steering.rolling], wheels.spin_rate[:, steering.rolling]
+    if len(steering.steered):
+        raise ArgumentError("path", "samples without wheel states", "those of a Track: it steers")
+    return path.twist @ robot.inverse.T, path.twist_rate @ robot.inverse.T
+
+
+def steered_wheels(
+    name: str, path: PathSamples, robot: Robot | None, key: str
+) -> tuple[WheelStates, tuple[float, ...]]:
+    """Wheel states, and the ``key`` of every [[steering]] of the robot, inf without. Raises
+    ArgumentError for a robot that does not steer, or none."""
+    groups = require_robot(name, robot).description.steering
+    if robot is None or not groups:
+        found = None if robot is None else robot.name
+        raise ArgumentError("robot", found, f"a robot that steers: the limit '{name}' needs one")
+    if path.wheels is None:
+        raise ArgumentError("path", "samples without wheel states", "those of a Track: it steers")
+    own = [getattr(group, key) for group in groups]
+    return path.wheels, tuple(np.inf if value is None else value for value in own)
 
 
 def require_robot(name: str, robot: Robot | None) -> Robot:

@@ -12,6 +12,7 @@ from trajopt.limits.limit import (
     linear_rows,
     require_each_positive,
     require_robot,
+    spins,
 )
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
@@ -22,9 +23,8 @@ class WheelAcceleration:
     """|angular acceleration| <= ``largest``, rad/s^2, of every wheel; one number, or one a wheel
     (W,), inf where a wheel has no limit.
 
-    Wheel rates are inverse @ twist s', so their derivative is inverse @ (twist s'' + twist_rate
-    s'^2): for two fixed wheels at +-b, |(1 +- b kappa) s'' +- b kappa' s'^2| <= r largest. Two rows
-    a wheel. Raises ArgumentError unless ``largest`` > 0, when there is no robot, or for another
+    Wheel rates are spin s', so their derivative is spin s'' + spin_rate s'^2: for two fixed wheels
+    at +-b, |(1 +- b kappa) s'' +- b kappa' s'^2| <= r largest. Two rows a wheel. Raises ArgumentError unless ``largest`` > 0, when there is no robot, or for another
     number of values than wheels.
     """
 
@@ -35,8 +35,8 @@ class WheelAcceleration:
         require_each_positive(f"{self.name}.largest", self.largest, "rad/s^2")
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
-        inverse = require_robot(self.name, robot).inverse
-        least, shares = by_wheel(f"{self.name}.largest", self.largest, len(inverse))
-        a, b = path.twist @ inverse.T * shares, path.twist_rate @ inverse.T * shares
+        spin, spin_rate = spins(path, require_robot(self.name, robot))
+        least, shares = by_wheel(f"{self.name}.largest", self.largest, spin.shape[1])
+        a, b = spin * shares, spin_rate * shares
         a, b = np.hstack([a, -a]), np.hstack([b, -b])
         return linear_rows(self.name, a, b, np.full_like(a, least), least)

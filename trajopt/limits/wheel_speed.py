@@ -12,6 +12,7 @@ from trajopt.limits.limit import (
     require_each_positive,
     require_robot,
     speed_rows,
+    spins,
 )
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
@@ -22,7 +23,7 @@ class WheelSpeed:
     """|wheel rate| <= ``largest``, rad/s, of every wheel (rolling rows of [wheels-lecture]); one
     number, or one a wheel (W,), inf where a wheel has no limit.
 
-    For two fixed wheels at +-b it is s'^2 <= (r largest / (1 + b |kappa|))^2.
+    With steered wheels and castors where they stand; for two fixed wheels at +-b it is s'^2 <= (r largest / (1 + b |kappa|))^2.
     Raises ArgumentError unless ``largest`` > 0, when there is no robot, or for another number of
     values than wheels.
     """
@@ -34,7 +35,6 @@ class WheelSpeed:
         require_each_positive(f"{self.name}.largest", self.largest, "rad/s")
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
-        inverse = require_robot(self.name, robot).inverse
-        least, shares = by_wheel(f"{self.name}.largest", self.largest, len(inverse))
-        rates = np.abs(path.twist @ inverse.T) * shares
-        return speed_rows(self.name, np.max(rates, axis=1), least)
+        spin, _ = spins(path, require_robot(self.name, robot))
+        least, shares = by_wheel(f"{self.name}.largest", self.largest, spin.shape[1])
+        return speed_rows(self.name, np.max(np.abs(spin) * shares, axis=1), least)

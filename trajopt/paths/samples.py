@@ -16,13 +16,16 @@ as the ground, its lateral axis level.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import InfeasibleError
 from trajopt.paths.path import Path
+from trajopt.robots.steering import WheelStates
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,13 @@ class PathSamples:
     velocity: Array  # (N, 3) body-frame velocity of the origin per unit path speed
     turning: Array  # (N, 3) angular velocity of the body per unit path speed, body frame, rad/m
     turning_rate: Array  # (N, 3) d turning / ds
+    wheel_states: Callable[[], WheelStates] | None = None
+    sd2: Array | None = None  # (N,) s'^2, m^2/s^2, where limits that are not linear are taken at
+
+    @cached_property
+    def wheels(self) -> WheelStates | None:
+        """Of the robot on its track; None where wheels stand as the robot's file draws them."""
+        return None if self.wheel_states is None else self.wheel_states()
 
     @property
     def rotation(self) -> Array:

@@ -21,7 +21,6 @@ from trajopt.arrays import Array, BoolArray, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.optimize.ipopt import numpy_on_symbols, smooth_table, solve_program, stacked, variables
-from trajopt.paths.samples import sample_path
 from trajopt.timing.stages import Stages, assemble
 from trajopt.timing.trajectory import Trajectory
 
@@ -287,7 +286,8 @@ def _first_guess(trajectory: Trajectory, jerk: float, n: int) -> Array:
 
 
 def _rows(trajectory: Trajectory, s: Array) -> Stages:
-    return assemble(sample_path(trajectory.path, s), trajectory.limits, trajectory.robot)
+    samples = trajectory.track.samples(s, trajectory.path.locate(s))
+    return assemble(samples, trajectory.limits, trajectory.robot)
 
 
 def _slowed(motion: SmoothMotion) -> tuple[SmoothMotion, Array, BoolArray]:

@@ -29,12 +29,12 @@ from trajopt.optimize.ipopt import (
     variables,
 )
 from trajopt.paths.path import Path
-from trajopt.paths.samples import sample_at
 from trajopt.robots.robot import Robot
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import assemble
+from trajopt.timing.track import track
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.terrain import Terrain
+from trajopt.world.ground import Ground
 
 Builder = Callable[[Array], Path]
 
@@ -89,7 +89,7 @@ def optimize_path(
     limits: Callable[[Path], Sequence[Limit]] | Sequence[Limit],
     *,
     robot: Robot | None = None,
-    ground: Terrain | None = None,
+    ground: Ground | None = None,
     trust: float = 0.3,
     steps: int = 12,
 ) -> JointResult:
@@ -116,7 +116,7 @@ def optimize_path(
     best = timed(z)
     first, history, radius = best.duration, [best.duration], trust
     for _ in range(steps):
-        fresh = _step(build, used, robot, best, z, box, radius)
+        fresh = _step(build, used, best, z, box, radius)
         try:
             trial = timed(fresh)
         except TrajoptError:  # outside of what can be driven: a shorter step
@@ -147,7 +147,6 @@ class _Linearised:
 def _step(
     build: Builder,
     used: Callable[[Path], Sequence[Limit]],
-    robot: Robot | None,
     now: Trajectory,
     z: Array,
     box: Array,
@@ -158,7 +157,7 @@ def _step(
     places = np.linspace(0.0, path.length, GRID_CELLS + 1)
     u = np.unique(np.concatenate([path.locate(places), np.asarray(path.basis.knots)]))
     u = u[np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])]
-    table = _linearised(build, used, robot, z, u)
+    table = _linearised(build, used, (now.robot, now.ground), z, u)
     n, d = len(u) - 1, len(z)
     x_now = np.interp(path.parameter(u), now.s, now.sd**2)
     symbols = variables(n + 1 + d)
@@ -205,7 +204,7 @@ def _step(
 def _linearised(
     build: Builder,
     used: Callable[[Path], Sequence[Limit]],
-    robot: Robot | None,
+    on: tuple[Robot | None, Ground | None],
     z: Array,
     u: Array,
 ) -> _Linearised:
@@ -213,8 +212,9 @@ def _linearised(
 
     def values(at: Array) -> tuple[Array, Array, Array, Array, Array]:
         path = build(at)
-        s = path.parameter(u)
-        rows = assemble(sample_at(path, s, u), tuple(used(path)), robot)
+        along = track(path, *on)
+        s = along.path.parameter(u)
+        rows = assemble(along.samples(s, u), tuple(used(path)), along.robot)
         return np.diff(s), rows.a, rows.b, rows.c, 1 / rows.sd2_max
 
     middle = values(z)

@@ -7,7 +7,7 @@ motion may also run above the profile where that pays for being below elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,7 +24,7 @@ from trajopt.robots.robot import Robot
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import check, fine_rows, stages_of
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.terrain import Flat, Terrain
+from trajopt.world.ground import Ground
 
 _CELLS = 400  # intervals of the least-squares program; chosen
 _TIGHTER = 1e-6  # share by which its rows are tightened, for the solver's own tolerance
@@ -57,10 +57,11 @@ def follow(
     limits: Sequence[Limit],
     *,
     robot: Robot | None = None,
-    ground: Terrain | None = None,
+    ground: Ground | None = None,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     start_wheels: ArrayLike = (),
+    start_steering: Mapping[str, float] | None = None,
     manner: Literal["below", "least_squares"] = "below",
 ) -> Followed:
     """The motion closest to ``profile`` (s' over s) within ``limits``.
@@ -79,23 +80,16 @@ def follow(
         start_speed=start_speed,
         end_speed=end_speed,
         start_wheels=start_wheels,
+        start_steering=start_steering,
     )
     if manner == "below":
         return Followed(below, np.interp(below.s, profile.places, profile.speeds))
-    return _least_squares(
-        path, profile, tuple(limits), robot, Flat() if ground is None else ground, below
-    )
+    return _least_squares(profile, tuple(limits), below)
 
 
 @numpy_on_symbols(False)
-def _least_squares(
-    path: Path,
-    profile: SpeedProfile,
-    limits: tuple[Limit, ...],
-    robot: Robot | None,
-    ground: Terrain,
-    warm: Trajectory,
-) -> Followed:
+def _least_squares(profile: SpeedProfile, limits: tuple[Limit, ...], warm: Trajectory) -> Followed:
+    path = warm.path
     places = np.unique(
         np.concatenate([np.linspace(0.0, path.length, _CELLS + 1), np.asarray(profile.places)])
     )
@@ -103,7 +97,7 @@ def _least_squares(
     u = np.unique(np.concatenate([path.locate(places), np.asarray(path.basis.knots)]))
     u = u[np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])]
     u[-1] = path.end
-    fine = fine_rows(path, u, limits, robot)
+    fine = fine_rows(warm.track, u, limits)
     stages = stages_of(fine)
     step, n = np.diff(fine.s), len(fine.s) - 1
     first = np.interp(fine.s, warm.s, warm.sd**2)
@@ -146,8 +140,8 @@ def _least_squares(
     found = Trajectory(
         path,
         limits,
-        robot,
-        ground,
+        warm.robot,
+        warm.ground,
         fine.u,
         fine.s,
         np.sqrt(sd2),
@@ -155,5 +149,6 @@ def _least_squares(
         "least_squares",
         float(np.sqrt(factor)),
         warm.start_wheels,
+        warm.start_steering,
     )
     return Followed(found, wanted)

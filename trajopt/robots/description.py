@@ -163,6 +163,13 @@ class SteeringSection(Section):
     name: str = Field(min_length=1)
     wheels: tuple[str, ...] = Field(min_length=1)
     range: Point | None = Field(None, description="from, to, rad; absent: endless")
+    rule: Literal["ackermann", "parallel"] = Field(
+        "ackermann",
+        description="of several wheels: ackermann, each at the angle that its own place needs; "
+        "parallel, all at the angle that the place in their middle needs",
+    )
+    rate: Positive | None = Field(None, description="largest, rad/s; absent: no limit")
+    acceleration: Positive | None = Field(None, description="largest, rad/s^2; absent: no limit")
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

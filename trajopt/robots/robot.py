@@ -20,7 +20,7 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.robots.description import RobotDescription, WheelSection
-from trajopt.robots.wheel import Row, Wheel, kinematic, null_space, outline, wheel_rates
+from trajopt.robots.wheel import Row, Wheel, WheelKind, kinematic, null_space, outline, wheel_rates
 from trajopt.schema import read_tables, set_key, validated
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, [iso80000-3]
@@ -29,7 +29,8 @@ DATA = Path(__file__).parent / "data"  # the shipped robots
 
 @dataclass(frozen=True)
 class Body:
-    """Rigid body data for slip and tip limits, SI units.
+    """Rigid body data for slip and tip limits, SI units. Inertias are about the centre of gravity,
+    products of inertia left out.
 
     ``contacts`` (C, 2) are the points on the ground that carry load, in the body frame (m); ``cog``
     is the centre of gravity (x, y, height) in the same frame. ``roller_axis`` (C,) is the angle
@@ -44,6 +45,8 @@ class Body:
     contacts: tuple[tuple[float, float], ...]
     roller_axis: tuple[float, ...]
     driven: tuple[bool, ...]
+    roll_inertia: float
+    pitch_inertia: float
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,25 +140,32 @@ class Robot:
             tuple(wheel.contact for wheel in wheels),
             axes,
             tuple(wheel.name in motors for wheel in wheels),
+            *self._inertias[:2],
         )
 
     @property
     def yaw_inertia(self) -> float:
-        """About the centre of gravity, kg m^2; what the file leaves out follows from masses: the
-        chassis as a plate, wheels and pivots as points."""
+        """About the centre of gravity, kg m^2; what the file leaves out follows from masses."""
+        given = self.description.body.yaw_inertia
+        return self._inertias[2] if given is None else given
+
+    @cached_property
+    def _inertias(self) -> tuple[float, float, float]:
+        """Of roll, pitch and yaw about the centre of gravity, kg m^2, from masses: the chassis as a
+        box of the mass that remains, wheels and pivots as points at the height of their axles."""
         section = self.description.body
-        if section.yaw_inertia is not None:
-            return section.yaw_inertia
-        x, y, _ = section.cog
-        parts = [(w.mass, *w.contact) for w in self.description.wheels]
-        places = {w.name: w.position for w in self.description.wheels}
-        parts += [(p.mass, *places[p.wheels[0]]) for p in self.description.pivots]
+        wheels = {w.name: w for w in self.description.wheels}
+        parts = [(w.mass, *w.contact, w.radius) for w in wheels.values()]
+        for pivot in self.description.pivots:
+            first = wheels[pivot.wheels[0]]
+            parts.append((pivot.mass, *first.position, first.radius))
         rest = section.mass - sum(part[0] for part in parts)
-        length, width, _ = section.chassis
-        plate = rest * (length**2 + width**2) / 12
-        px, py = section.chassis_place
-        parts.append((rest, px, py))
-        return plate + sum(m * ((a - x) ** 2 + (b - y) ** 2) for m, a, b in parts)
+        parts.append((rest, *section.chassis_place, section.clearance + section.chassis[2] / 2))
+        x, y, z = (d**2 * rest / 12 for d in section.chassis)  # of the box about its own middle
+        for m, *place in parts:
+            a, b, c = (m * (p - q) ** 2 for p, q in zip(place, section.cog, strict=True))
+            x, y, z = x + a, y + b, z + c
+        return y + z, x + z, x + y
 
     @cached_property
     def footprint(self) -> tuple[tuple[float, float], ...]:
@@ -227,22 +237,29 @@ class Robot:
         spot, sqrt(dx^2 + dy^2 + (L dpsi)^2): the largest distance of a wheel from the origin."""
         return float(max(w.l for w in self.wheels))
 
+    @cached_property
+    def drivable(self) -> Array:
+        """(3, m): orthonormal basis of the body twists that no wheel forbids once steered wheels
+        stand as the twist needs."""
+        if self.description.skid is not None:
+            return np.eye(3)[:, [0, 2]]
+        rows = [w.sliding() for w in self.wheels if w.kind is WheelKind.FIXED]
+        return null_space(np.array([[r.x, r.y, r.yaw] for r in rows]))
+
     def require_rolling(self, twist: Array, places: Array) -> None:
         """Raises InfeasibleError where the wheels forbid a body twist (N, 3) at path parameters
         (N,), m."""
-        slipping = twist - twist @ self.admissible @ self.admissible.T
+        slipping = twist - twist @ self.drivable @ self.drivable.T
         bad = np.abs(slipping).max(axis=1) > 1e-6 * np.abs(twist).max(axis=1)
         if not bad.any():
             return
-        steered = [w.name for w in self.rolling if w.kind == "steered"]
         why = f"the wheels of '{self.name}' cannot roll along this path; "
-        if steered:
-            why += (
-                f"its steered wheels ({', '.join(steered)}) stand at their start angle, and motions "
-                "that steer are not planned: only straight ones"
-            )
-        elif self.admissible.shape[1] == 1 and all(w.kind == "fixed" for w in self.rolling):
+        if self.drivable.shape[1] == 1:
             why += "they forbid every turn: give [skid] with an effective track"
+        elif abs(self.drivable[1]).max() > 1e-9:
+            why += (
+                "it must be that of a point on the line of its fixed axle: move the body's origin"
+            )
         else:
             why += "leave its heading to the direction of travel"
         raise InfeasibleError("rolling", float(places[int(np.argmax(bad))]), why)

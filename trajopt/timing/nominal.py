@@ -3,7 +3,7 @@ commands."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,9 @@ from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.timing.grid import initial_grid
 from trajopt.timing.linear import linear_profile
+from trajopt.timing.track import track
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.terrain import Flat, Terrain
+from trajopt.world.ground import Ground
 
 
 def nominal_timing(
@@ -24,16 +25,19 @@ def nominal_timing(
     limits: Sequence[Limit],
     *,
     robot: Robot | None = None,
-    ground: Terrain | None = None,
+    ground: Ground | None = None,
     start_wheels: ArrayLike = (),
+    start_steering: Mapping[str, float] | None = None,
 ) -> Trajectory:
     """Trajectory along ``path`` in ``duration`` s with the spline parameter uniform in time.
 
     Nothing is scaled: ``margins()`` of the result say by how much ``limits`` are kept or broken.
     The motion neither starts nor ends at rest. ``start_wheels`` (W,): wheel angles at the start,
-    rad; () for zeros. Raises ArgumentError for a duration that is not positive.
+    rad; () for zeros; ``start_steering`` as in ``time_scale``. Raises ArgumentError for a duration that is not positive.
     """
     require_positive("duration", duration, "s")
+    along = track(path, robot, ground, start_steering)
+    path = along.path
     u = initial_grid(path, None)
     s = path.parameter(u)
     sd2 = linear_profile(path, u)
@@ -43,7 +47,7 @@ def nominal_timing(
         path,
         tuple(limits),
         robot,
-        ground or Flat(),
+        along.ground,
         u,
         s,
         np.sqrt(sd2),
@@ -51,4 +55,5 @@ def nominal_timing(
         "nominal",
         1.0,
         np.asarray(start_wheels, dtype=np.float64),
+        along.start_steering,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,7 +13,7 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
-from trajopt.paths.samples import require_moving, sample_at
+from trajopt.paths.samples import require_moving
 from trajopt.robots.robot import Robot
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
 from trajopt.timing.feasibility import require_motion
@@ -22,8 +22,9 @@ from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
+from trajopt.timing.track import Track, track
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.terrain import Flat, Terrain
+from trajopt.world.ground import Ground
 
 REFINE_ABOVE = (
     1e-5  # violation of s'^2 between gridpoints, relative, that is refined away if it can; chosen
@@ -37,6 +38,7 @@ _TIGHTER = (
     1e-4,
     1e-3,
 )  # shares taken off all limits, in turn, where slowing down does not help; chosen
+_JUMP = 1e-2  # of a wheel speed, at a line of the ground; chosen: as much as tyres give way
 _FASTEST = 1e6  # m/s, chosen: beyond it is an input error, and squares stay far from overflow
 
 
@@ -44,15 +46,17 @@ _FASTEST = 1e6  # m/s, chosen: beyond it is an input error, and squares stay far
 class _Job:
     """What to scale. Ends are s'^2; ``stops`` are path parameters where the robot comes to rest."""
 
-    path: Path
+    track: Track
     limits: tuple[Limit, ...]
-    robot: Robot | None
-    ground: Terrain
     start: float
     end: float
     stops: Array
     engine: str
     start_wheels: Array
+
+    @property
+    def path(self) -> Path:
+        return self.track.path
 
 
 def time_scale(
@@ -60,7 +64,7 @@ def time_scale(
     limits: Sequence[Limit],
     *,
     robot: Robot | None = None,
-    ground: Terrain | None = None,
+    ground: Ground | None = None,
     start_speed: float = 0.0,
     end_speed: float = 0.0,
     gridpoints: int | ArrayLike | None = None,
@@ -68,9 +72,14 @@ def time_scale(
     stops: ArrayLike = (),
     too_fast: Literal["refuse", "brake"] = "refuse",
     start_wheels: ArrayLike = (),
+    start_steering: Mapping[str, float] | None = None,
 ) -> Trajectory:
     """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s',
     m/s).
+
+    ``ground``: a plane path is laid onto it (the trajectory's path is then the laid one, and path
+    parameters are arc lengths in space); a path in space must lie on it. Without ground, or with
+    ``Flat``, the path itself is the ground, level across its direction.
 
     ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast
     pass, where only s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are
@@ -83,7 +92,9 @@ def time_scale(
     ``start_speed`` can reach, as when a zone appears in front of a moving robot: "refuse" raises
     InfeasibleError, "brake" brakes into it as fast as the other limits allow (with 99.9 % of it);
     the trajectory's limits, and so its margins, then hold the bound that was raised to that
-    braking. ``start_wheels`` (W,): wheel angles at the start, rad; () for zeros.
+    braking. ``start_wheels`` (W,): wheel angles at the start, rad; () for zeros. ``start_steering``:
+    steering and castor angles at the start, rad, by wheel; castors that are not named start as the
+    robot's file draws them, steered wheels as the path begins.
 
     What is still broken between gridpoints is removed by slowing the whole motion, end speeds
     included, by at most 0.1 % (``Trajectory.slowdown``). Where standing still breaks a limit
@@ -93,17 +104,18 @@ def time_scale(
     Raises ArgumentError for bad arguments, InfeasibleError (limit and place) where no motion
     exists, and MissingDependencyError for "compiled" without numba.
     """
-    job = _job(path, limits, robot, ground, (start_speed, end_speed), engine, stops, start_wheels)
-    u = insert(path, initial_grid(path, gridpoints), job.stops)
+    speeds, start = (start_speed, end_speed), (start_wheels, start_steering)
+    job = _job(path, limits, robot, ground, speeds, engine, stops, start)
+    u = insert(job.path, initial_grid(job.path, gridpoints), job.stops)
     _require_drivable(job, u)
     if too_fast == "brake" and start_speed > 0:
         job = replace(
-            job, limits=yielding(job.limits, fine_rows(path, u, job.limits, robot), job.start)
+            job, limits=yielding(job.limits, fine_rows(job.track, u, job.limits), job.start)
         )
     elif too_fast not in ("refuse", "brake"):
         raise ArgumentError("too_fast", too_fast, "refuse or brake")
     if engine == "linear":
-        return _linear(job, fine_rows(path, u, job.limits, robot))
+        return _linear(job, fine_rows(job.track, u, job.limits))
     for tighter in _TIGHTER:
         fine, sd2, worst, name = _refined(job, u, tighter)
         factor = max(1.0, worst)
@@ -146,11 +158,11 @@ def _job(
     path: Path,
     limits: Sequence[Limit],
     robot: Robot | None,
-    ground: Terrain | None,
+    ground: Ground | None,
     speeds: tuple[float, float],
     engine: str,
     stops: ArrayLike,
-    start_wheels: ArrayLike = (),
+    start: tuple[ArrayLike, Mapping[str, float] | None] = ((), None),
 ) -> _Job:
     """The checked arguments. Raises ArgumentError."""
     if not isinstance(path, Path):
@@ -171,6 +183,8 @@ def _job(
         if isinstance(speed, (str, bool)) or not (0 <= speed <= _FASTEST):
             raise ArgumentError(argument, speed, f"a path speed from 0 to {_FASTEST:g} m/s")
     require_engine(engine)
+    along = track(path, robot, ground, start[1])
+    path = along.path
     places = np.atleast_1d(np.asarray(stops, dtype=np.float64))
     if places.ndim != 1 or not np.all((places > 0) & (places < path.length)):
         raise ArgumentError("stops", stops, f"path parameters between 0 and {path.length:.6g} m")
@@ -180,20 +194,30 @@ def _job(
             (*speeds, *places),
             "0 and none: linear scaling takes the path's own speeds",
         )
-    shape = Flat() if ground is None else ground
-    shape.check(path)
-    wheels = np.asarray(start_wheels, dtype=np.float64)
+    wheels = np.asarray(start[0], dtype=np.float64)
     squares = speeds[0] ** 2, speeds[1] ** 2
-    return _Job(path, tuple(limits), robot, shape, *squares, places, engine, wheels)
+    return _Job(along, tuple(limits), *squares, places, engine, wheels)
 
 
 def _require_drivable(job: _Job, u: Array) -> None:
     """Raises InfeasibleError where the path has no direction, or the robot's wheels forbid its
     twist."""
     require_moving(job.path)
-    twist = sample_at(job.path, job.path.parameter(u), u).twist
-    if job.robot is not None:
-        job.robot.require_rolling(twist, job.path.parameter(u))
+    s, along = job.path.parameter(u), job.track
+    twist = along.motion(s, u)[0].twist
+    if along.robot is None:
+        return
+    along.robot.require_rolling(twist, s)
+    if along.ground.lines:
+        before = along.motion(s[1:-1], np.nextafter(u[1:-1], -np.inf))[0].twist
+        jump = np.abs((before - twist[1:-1]) * [1.0, 1.0, along.robot.turning_length]).max(axis=1)
+        if jump.max() > _JUMP * np.abs(twist).max():
+            raise InfeasibleError(
+                "ground",
+                float(s[1:-1][int(np.argmax(jump))]),
+                "the ground's curvature jumps where the path crosses it at an angle, and with it "
+                'the wheel speeds: give the ramp smooth edges (edge = "smooth")',
+            )
 
 
 def _stages(job: _Job, fine: FineRows, tighter: float) -> Stages:
@@ -211,11 +235,10 @@ def _stages(job: _Job, fine: FineRows, tighter: float) -> Stages:
 
 def _with_edges(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Stages]:
     """Rows and stages on the grid u and on the edges of the limits."""
-    fine = fine_rows(job.path, u, job.limits, job.robot)
+    fine = fine_rows(job.track, u, job.limits)
     if fine.edges:
-        fine = refined(
-            job.path, fine, insert(job.path, u, np.asarray(fine.edges)), job.limits, job.robot
-        )
+        u = insert(job.path, u, np.asarray(fine.edges))
+        fine = refined(job.track, fine, u, job.limits)
     return fine, _stages(job, fine, tighter)
 
 
@@ -240,7 +263,7 @@ def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, floa
             )
         if done < MOST_ROUNDS - 1:
             grid = split(fine.u, excess > REFINE_ABOVE, 3)
-            fine = refined(job.path, fine, grid, job.limits, job.robot)
+            fine = refined(job.track, fine, grid, job.limits)
             stages = _stages(job, fine, tighter)
     at = int(np.argmax(excess))
     limit = job.limits[int(np.argmin(found.slack[at]))].name
@@ -258,8 +281,8 @@ def _trajectory(job: _Job, fine: FineRows, sd2: Array, factor: float, engine: st
     return Trajectory(
         job.path,
         job.limits,
-        job.robot,
-        job.ground,
+        job.track.robot,
+        job.track.ground,
         fine.u,
         fine.s,
         np.sqrt(sd2),
@@ -267,15 +290,15 @@ def _trajectory(job: _Job, fine: FineRows, sd2: Array, factor: float, engine: st
         engine,
         float(np.sqrt(factor)),
         job.start_wheels,
+        job.track.start_steering,
     )
 
 
 def _linear(job: _Job, fine: FineRows) -> Trajectory:
     """One factor on the time of the whole motion ([waheed2006], eqs. 2.34 to 2.39)."""
     if fine.edges:
-        fine = refined(
-            job.path, fine, insert(job.path, fine.u, np.asarray(fine.edges)), job.limits, job.robot
-        )
+        u = insert(job.path, fine.u, np.asarray(fine.edges))
+        fine = refined(job.track, fine, u, job.limits)
     sd2 = linear_profile(job.path, fine.u)
     found = check(fine, sd2)
     worst = float(found.factor.max())

@@ -31,7 +31,7 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
             trajectory.engine,
             "a time-optimal trajectory: " + ", ".join(ENGINES),
         )
-    fine = fine_rows(trajectory.path, trajectory.u, trajectory.limits, trajectory.robot)
+    fine = fine_rows(trajectory.track, trajectory.u, trajectory.limits)
     stages = stages_of(fine)
     stopped = np.repeat(trajectory.sd <= 0, 2)[1:-1]
     stopped[[0, -1]] = False

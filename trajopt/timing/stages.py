@@ -16,9 +16,9 @@ import numpy as np
 from trajopt.arrays import Array, IndexArray
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
-from trajopt.paths.path import Path
-from trajopt.paths.samples import PathSamples, sample_at
+from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
+from trajopt.timing.track import Track
 
 SD2_CAP = 1e8  # m^2/s^2; stands for "no bound": 10 km/s, far beyond any ground robot
 FINER = 10  # intervals of the fine grid in one of the solver's; chosen
@@ -106,16 +106,16 @@ def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Robot | None)
     return Stages(samples.s, a, b, c, np.min(bounds, axis=0), names, owner, bounds, edges)
 
 
-def fine_rows(path: Path, u: Array, limits: Sequence[Limit], robot: Robot | None) -> FineRows:
+def fine_rows(track: Track, u: Array, limits: Sequence[Limit]) -> FineRows:
     """Rows of all limits inside every interval of the grid u (N+1,)."""
-    (share, a, b, c, bounds), some = _rows_inside(path, u[:-1], u[1:], limits, robot)
+    (share, a, b, c, bounds), some = _rows_inside(track, u[:-1], u[1:], limits)
     return FineRows(
-        u, path.parameter(u), share, a, b, c, bounds, some.names, some.row_owner, some.edges
+        u, track.path.parameter(u), share, a, b, c, bounds, some.names, some.row_owner, some.edges
     )
 
 
 def _rows_inside(
-    path: Path, left: Array, right: Array, limits: Sequence[Limit], robot: Robot | None
+    track: Track, left: Array, right: Array, limits: Sequence[Limit]
 ) -> tuple[tuple[Array, ...], Stages]:
     """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,); and the last
     of the pieces that they were assembled in, which has names, owners and edges."""
@@ -123,8 +123,8 @@ def _rows_inside(
     for first in range(0, len(left), _CHUNK):
         part = slice(first, min(first + _CHUNK, len(left)))
         fine = _fine_grid(left[part], right[part])
-        s = path.parameter(fine.ravel())
-        rows = assemble(sample_at(path, s, fine.ravel()), limits, robot)
+        s = track.path.parameter(fine.ravel())
+        rows = assemble(track.samples(s, fine.ravel()), limits, track.robot)
         s = s.reshape(fine.shape)
         pieces = (
             (s - s[:, :1]) / (s[:, -1:] - s[:, :1]),
@@ -140,9 +140,7 @@ def _rows_inside(
     return found, rows
 
 
-def refined(
-    path: Path, fine: FineRows, u: Array, limits: Sequence[Limit], robot: Robot | None
-) -> FineRows:
+def refined(track: Track, fine: FineRows, u: Array, limits: Sequence[Limit]) -> FineRows:
     """Rows on the grid u (M+1,), which contains that of ``fine``: what is known is taken over."""
     at = np.searchsorted(u, fine.u)
     whole = np.flatnonzero(np.diff(at) == 1)  # intervals of the old grid that stay
@@ -150,7 +148,7 @@ def refined(
     fresh[at[whole]] = False
     if not fresh.any():
         return fine
-    new, _ = _rows_inside(path, u[:-1][fresh], u[1:][fresh], limits, robot)
+    new, _ = _rows_inside(track, u[:-1][fresh], u[1:][fresh], limits)
 
     def merged(known: Array, added: Array) -> Array:
         values = np.empty((len(u) - 1, *known.shape[1:]))
@@ -160,7 +158,7 @@ def refined(
 
     return FineRows(
         u,
-        path.parameter(u),
+        track.path.parameter(u),
         merged(fine.share, new[0]),
         merged(fine.a, new[1]),
         merged(fine.b, new[2]),

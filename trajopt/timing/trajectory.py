@@ -15,11 +15,11 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
-from trajopt.paths.samples import sample_at
 from trajopt.robots.robot import Robot
+from trajopt.robots.steering import steering_of
 from trajopt.timing.stages import Check, check, fine_rows
-from trajopt.timing.wheels import WheelTable, wheel_table
-from trajopt.world.terrain import Terrain
+from trajopt.timing.track import Track
+from trajopt.world.ground import Ground
 
 _BINDS = 2e-3  # relative margin below which a limit counts as binding; above the largest slow-down (0.1 %)
 _ON_TIME = 1e-12  # share of the duration by which a time may lie outside through rounding
@@ -36,12 +36,20 @@ class Stretch(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class State:
     """Robot state at N times. Poses are (x, y, yaw) in the world, twists (vx, vy, wz) in the body
-    frame."""
+    frame, which stands on the ground."""
 
     pose: Array  # (N, 3) m, m, rad (yaw continuous along the path)
     twist: Array  # (N, 3) m/s, m/s, rad/s
     wheel_angles: Array  # (N, W) rad, from the trajectory's start_wheels; W = 0 without a robot
     wheel_speeds: Array  # (N, W) rad/s
+    position: Array  # (N, 3) of the body's origin in the world, m
+    rotation: Array  # (N, 3, 3): columns are the body's axes in the world
+    spin_angles: Array  # (N, K) rad, of all wheels of the robot's file; those of W are wheel_angles
+    spin_rates: Array  # (N, K) rad/s
+    steering_angles: (
+        Array  # (N, K) rad, of castors and steered wheels from the file's angle, else 0
+    )
+    steering_rates: Array  # (N, K) rad/s
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +64,7 @@ class Trajectory:
     path: Path
     limits: tuple[Limit, ...]
     robot: Robot | None
-    ground: Terrain
+    ground: Ground
     u: Array  # (N+1,) spline parameter at the gridpoints
     s: Array  # (N+1,) path parameter at the gridpoints, m
     sd: Array  # (N+1,) path speed, m/s
@@ -64,6 +72,7 @@ class Trajectory:
     engine: str
     slowdown: float
     start_wheels: Array = field(default_factory=lambda: np.zeros(0))  # (W,) rad; () means zeros
+    start_steering: Mapping[str, float] = field(default_factory=dict)  # rad, see ``time_scale``
 
     def __post_init__(self) -> None:
         count = 0 if self.robot is None else len(self.robot.wheels)
@@ -103,16 +112,29 @@ class Trajectory:
         duration]."""
         s, speed, _ = self.along(t)
         u = self.path.locate(s)
-        samples = sample_at(self.path, s, u)
+        samples = self.track.samples(s, u)
         table_u, table_yaw = self._yaw_table
         turns = np.round((np.interp(u, table_u, table_yaw) - samples.yaw) / (2 * np.pi))
         pose = np.column_stack([samples.position[:, :2], samples.yaw + 2 * np.pi * turns])
         twist = samples.twist * speed[:, None]
-        if self.robot is None or self._wheels is None:
+        place = (samples.position, samples.rotation)
+        if self.robot is None or samples.wheels is None:
             none = np.zeros((len(s), 0))
-            return State(pose, twist, none, none)
-        angles = self.start_wheels + self._wheels.at(u)
-        return State(pose, twist, angles, twist @ self.robot.inverse.T)
+            return State(pose, twist, none, none, *place, none, none, none, none)
+        rolling, wheels = steering_of(self.robot).rolling, samples.wheels
+        angles, rates = self.track.wheels.at(u), wheels.spin * speed[:, None]
+        angles[:, rolling] += self.start_wheels
+        return State(
+            pose,
+            twist,
+            angles[:, rolling],
+            rates[:, rolling],
+            *place,
+            angles,
+            rates,
+            wheels.steering,
+            wheels.steering_rate * speed[:, None],
+        )
 
     def margins(self) -> Mapping[str, float]:
         """Least relative margin of every limit, recomputed on a grid ten times finer than the
@@ -146,11 +168,12 @@ class Trajectory:
 
     @cached_property
     def _check(self) -> Check:
-        return check(fine_rows(self.path, self.u, self.limits, self.robot), self.sd**2)
+        return check(fine_rows(self.track, self.u, self.limits), self.sd**2)
 
     @cached_property
-    def _wheels(self) -> WheelTable | None:
-        return None if self.robot is None else wheel_table(self.path, self.robot)
+    def track(self) -> Track:
+        """The path on its ground, with the robot's wheel states along it."""
+        return Track(self.path, self.robot, self.ground, self.start_steering)
 
     @cached_property
     def _yaw_table(self) -> tuple[Array, Array]:

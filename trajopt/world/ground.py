@@ -20,7 +20,7 @@ class Line(NamedTuple):
 class Ground(Protocol):
     """The shape of the ground; x, y and heights in m, world frame.
 
-    ``lines``: where derivatives of the height jump. ``grain`` (m): the length over which its shape
+    ``level``: whether it is, everywhere. ``lines``: where derivatives of the height jump. ``grain`` (m): the length over which its shape
     varies beside these lines, inf where it is plane there. ``bends``: whether it bends on the scale
     of a robot, so that a robot's posture follows from the heights under its wheels; elsewhere it is
     the tangent plane at the robot's origin.
@@ -34,6 +34,9 @@ class Ground(Protocol):
 
     @property
     def bends(self) -> bool: ...
+
+    @property
+    def level(self) -> bool: ...
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Height, m, at positions of any shape."""

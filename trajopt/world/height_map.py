@@ -1,6 +1,6 @@
 """Ground given by heights on a regular grid.
 
-Two surfaces pass through the grid's points. Physics, and the wheels of thesis 001, roll on the
+Two surfaces pass through the grid's points. Physics, and the wheels of [udengaard2008], roll on the
 triangulated one: each cell is split along the diagonal from its lower-left to its upper-right
 corner, and beyond the grid the ground goes on level at the height of its edge. Postures follow a
 smooth one, a spline of fifth degree, whose derivatives are continuous up to the fourth.
@@ -40,6 +40,7 @@ class HeightMap:
     grade: float = np.pi / 3
     lines: ClassVar[tuple[Line, ...]] = ()
     bends: ClassVar[bool] = True
+    level: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         require_grid("ground.heights", self.heights)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.errors import InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.paths.series import Series
 from trajopt.paths.spline import SplineBasis
@@ -60,9 +60,7 @@ def lay(path: Path, ground: Ground) -> Path:
     Raises InfeasibleError, with place, where a path in space is off the ground by more than 1 mm,
     or as the ground's ``check``.
     """
-    if isinstance(path, LaidPath):
-        raise ArgumentError("path", "a path laid already", "the plane path, or no ground")
-    if path.coordinates.shape[1] == 3:
+    if path.coordinates.shape[1] == 3 or isinstance(path, LaidPath):
         u = np.linspace(path.start, path.end, 64 * (len(path.basis.knots) - 1) + 1)
         p = path.position(u)
         off = p[:, 2] - ground.partial(p[:, 0], p[:, 1], 0, 0)
@@ -74,8 +72,11 @@ def lay(path: Path, ground: Ground) -> Path:
                 f"the path is {abs(off[worst]):.3g} m {'above' if off[worst] > 0 else 'below'} the "
                 "ground; give a plane path, or one that lies on the ground",
             )
-        ground.check(path)
-        return path
+        if not isinstance(path, LaidPath):
+            ground.check(path)
+            return path
+        assert path.plane is not None
+        path = path.plane
     knots = _knots(path, ground)
     basis = SplineBasis(tuple(knots.tolist()), clamped_start=True, clamped_end=True)
     ends = np.array([path.start, path.end])

@@ -35,6 +35,7 @@ class Mesh:
     grade: float = np.pi / 3
     lines: ClassVar[tuple[Line, ...]] = ()
     bends: ClassVar[bool] = True
+    level: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         require_positive("ground.spacing", self.spacing, "m between points of the mesh's map")

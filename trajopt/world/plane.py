@@ -35,6 +35,10 @@ class Plane:
     bends: ClassVar[bool] = False
 
     @property
+    def level(self) -> bool:
+        return self.slope == 0
+
+    @property
     def gradient(self) -> tuple[float, float]:
         """(dz/dx, dz/dy)."""
         rise = float(np.tan(self.slope))

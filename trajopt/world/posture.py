@@ -60,7 +60,8 @@ class Frame:
 def frame_on(
     ground: Ground, path: Path, u: Array, contacts: Array | None = None, order: int = 3
 ) -> Frame:
-    """Frames along ``path`` (laid on the ground, or in space on it) at spline parameters (N,).
+    """Frames along ``path`` (laid on the ground, in space on it, or with ``Flat`` the ground itself)
+    at spline parameters (N,).
 
     ``contacts`` (C, 2), m, body frame: where wheels stand, used where the ground bends. The origin
     has derivatives up to ``order`` (3 or 4), the axes up to one less.
@@ -78,6 +79,8 @@ def frame_on(
     if path.heading is not None:
         turn = Series.of([path.turning_length * path.yaw(u, k) for k in range(4)], order).d()
         pace = pace + turn * turn
+    if ground.level:
+        return _along(x.cut(order), y.cut(order), surface, own, pace.sqrt())
     if contacts is not None and ground.bends:
         cos, sin = own if own is not None else _direction(x, y)
         z, slope_x, slope_y = _plane_under(ground, x, y, cos, sin, contacts, order)
@@ -95,6 +98,24 @@ def frame_on(
         ahead = (travel[0] - off[0], travel[1] - off[1], travel[2] - off[2])
     forward = unit(ahead)
     return Frame(origin, forward, cross(up, forward), up, pace.sqrt())
+
+
+def _along(
+    x: Series,
+    y: Series,
+    z: Series,
+    own: tuple[Series, Series] | None,
+    pace: Series,
+) -> Frame:
+    """Frames where the path itself is the ground: its lateral axis stays level."""
+    zero = Series(np.zeros((x.order, *x.c[0].shape)))
+    if own is not None:  # on level ground, see Path
+        cos, sin = own
+        up = (zero, zero, zero + 1.0)
+        return Frame((x, y, z), (cos, sin, zero), (-sin, cos, zero), up, pace)
+    forward, (cos, sin) = unit((x.d(), y.d(), z.d())), _direction(x, y)
+    left = (-sin, cos, zero)
+    return Frame((x, y, z), forward, left, cross(forward, left), pace)
 
 
 def samples_on(

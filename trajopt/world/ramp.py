@@ -14,13 +14,10 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array, require_finite, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
-from trajopt.paths.spline import SplineBasis
 from trajopt.world.ground import Line
+from trajopt.world.laid import lay
 
-_EDGE_KNOTS = (
-    8  # knots across a rounded edge when a path is laid over a ramp; chosen: z within 0.1 mm
-)
-
+_STEEPEST = np.nextafter(np.pi / 2, 0.0)  # rad, where no grade is asked for
 
 Edge = Literal["mean", "smooth"]
 _MEANS: Mapping[Edge, int] = MappingProxyType({"mean": 1, "smooth": 3})
@@ -113,6 +110,10 @@ class Ramps:
     def lines(self) -> tuple[Line, ...]:
         return tuple(line for ramp in self.ramps for line in ramp.lines)
 
+    @property
+    def level(self) -> bool:
+        return not self.ramps
+
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         return self.partial(x, y, 0, 0)
 
@@ -144,47 +145,5 @@ def require_grade(path: Path, grade: float) -> None:
 
 
 def lay_over(path: Path, ramps: Sequence[Ramp]) -> Path:
-    """The level ``path`` with z from the ramps' height: same curve in the plane, more knots at the
-    edges.
-
-    A cubic spline keeps its curve when knots are added, so x and y do not change. Raises
-    ArgumentError for a path with a heading of its own or one that has a height already.
-    """
-    if path.heading is not None or path.coordinates.shape[1] != 2:
-        raise ArgumentError(
-            "path", path.coordinates.shape, "a level path that drives along its heading"
-        )
-    u = np.unique(
-        np.concatenate([np.asarray(path.basis.knots), *(_edge_knots(path, r) for r in ramps)])
-    )
-    keep = np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])
-    u = u[keep]
-    u[-1] = path.end
-    p = path.position(u)
-    z = sum((r.height_at(p[:, 0], p[:, 1]) for r in ramps), np.zeros(len(u)))
-    basis = SplineBasis(tuple(u.tolist()), clamped_start=True, clamped_end=True)
-    ends = path.position(np.array([path.start, path.end]), 1)
-    step = 1e-6 * (path.end - path.start)
-    near = path.position(np.array([path.start, path.start + step, path.end - step, path.end]))
-    height = sum((r.height_at(near[:, 0], near[:, 1]) for r in ramps), np.zeros(4))
-    ends[:, 2] = (height[1] - height[0]) / step, (height[3] - height[2]) / step
-    return Path(basis, np.vstack([np.column_stack([p[:, :2], z]), ends]))
-
-
-def _edge_knots(path: Path, ramp: Ramp) -> Array:
-    """Spline parameters of knots across the ramp's rounded edges, where the path crosses them."""
-    u = np.linspace(path.start, path.end, 4000)
-    p = path.position(u)
-    d = ramp.along(p[:, 0], p[:, 1])
-    half = ramp.rounding / 2
-    levels = np.concatenate(
-        [edge + np.linspace(-half, half, _EDGE_KNOTS + 1) for edge in (0.0, ramp.run)]
-        + [np.linspace(half, ramp.run - half, 5)]
-    )
-    found = []
-    for level in levels:
-        side = d > level
-        for i in np.flatnonzero(side[1:] != side[:-1]):
-            share = (level - d[i]) / (d[i + 1] - d[i])
-            found.append(u[i] + share * (u[i + 1] - u[i]))
-    return np.asarray(found, dtype=np.float64)
+    """The plane ``path`` laid on level ground with ramps, whatever their slope."""
+    return lay(path, Ramps(tuple(ramps), _STEEPEST))

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from trajopt.errors import ArgumentError
+from trajopt.world.ground import Ground
 from trajopt.world.obstacles import Obstacle
-from trajopt.world.terrain import Terrain
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Scene:
     """
 
     friction: float
-    ground: Terrain
+    ground: Ground
     obstacles: tuple[Obstacle, ...] = ()
 
     def __post_init__(self) -> None:

@@ -1,0 +1,45 @@
+"""Acceleration of every steering angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trajopt.limits.limit import (
+    Rows,
+    by_wheel,
+    linear_rows,
+    require_each_positive,
+    steered_wheels,
+)
+from trajopt.paths.samples import PathSamples
+from trajopt.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class SteeringAcceleration:
+    """|steering acceleration| <= ``largest``, rad/s^2, of every [[steering]] of the robot; one number, or one
+    each (G,), inf where there is no limit; None: those of the robot's file.
+
+    The angle of several wheels steered together is that of a wheel in their middle. The
+    angle is a function of the path, so its acceleration is group_rate s'' + group_bend s'^2. Two
+    rows a steering.
+    Raises ArgumentError unless ``largest`` > 0, for a robot that does not steer or whose file gives
+    no acceleration where none is asked for, or without a robot.
+    """
+
+    largest: float | tuple[float, ...] | None = None  # rad/s^2
+    name: str = "steering_acceleration"
+
+    def __post_init__(self) -> None:
+        if self.largest is not None:
+            require_each_positive(f"{self.name}.largest", self.largest, "rad/s^2")
+
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
+        wheels, own = steered_wheels(self.name, path, robot, "acceleration")
+        asked = own if self.largest is None else self.largest
+        least, shares = by_wheel(f"{self.name}.largest", asked, len(own))
+        a, b = wheels.group_rate * shares, wheels.group_bend * shares
+        a, b = np.hstack([a, -a]), np.hstack([b, -b])
+        return linear_rows(self.name, a, b, np.full_like(a, least), least)
