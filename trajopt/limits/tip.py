@@ -70,7 +70,8 @@ def support_edges(arms: Array) -> tuple[Array, Array]:
 
 
 def moving_edges(arms: Array) -> tuple[Array, Array]:
-    """As ``support_edges`` for contacts (N, C, 2): normals (N, E, 2), distances (N, E)."""
+    """As ``support_edges`` for contacts (N, C, 2): normals (N, C, 2), distances (N, C). As many
+    edges as contacts: what is too many gets (0, 0) and 1 m, which never binds."""
     corners = [int(np.argmin(np.sum((arms[0] - p) ** 2, axis=1))) for p in _convex_hull(arms[0])]
     hull = arms[:, corners]
     edge = np.roll(hull, -1, axis=1) - hull
@@ -80,13 +81,17 @@ def moving_edges(arms: Array) -> tuple[Array, Array]:
         distances = np.sum(normals * hull, axis=2)
         reach = normals @ arms.swapaxes(1, 2)
         if np.all(reach <= distances[..., None] + 1e-12):
-            return normals, distances  # the same contacts are the corners everywhere
+            # the same contacts are the corners everywhere
+            spare = arms.shape[1] - len(corners)
+            return (
+                np.pad(normals, ((0, 0), (0, spare), (0, 0))),
+                np.pad(distances, ((0, 0), (0, spare)), constant_values=1.0),
+            )
     return _edges_from_each(arms)
 
 
 def _edges_from_each(arms: Array) -> tuple[Array, Array]:
-    """The edge that starts at each contact, (N, C, 2) and (N, C); a contact that starts none gets
-    (0, 0) and 1 m, which never binds."""
+    """The edge that starts at each contact, or (0, 0) and 1 m where none does."""
     edge = arms[:, None] - arms[:, :, None]  # (N, from, to, 2)
     turn = edge[:, :, :, None, 0] * edge[:, :, None, :, 1]
     turn = turn - edge[:, :, :, None, 1] * edge[:, :, None, :, 0]

@@ -22,6 +22,7 @@ from trajopt.world.ground import Line
 
 LARGEST_GRID = 4_000_000  # points; 32 MB as doubles, a 40 m square at 2 cm; chosen
 _CHECKS_PER_CELL = 2  # path samples a grid cell when slopes are checked; chosen
+_PLANE = 1e-9  # m, chosen: a map whose second differences are smaller is plane
 _DEGREE = 5  # of the smooth surface: its fourth derivatives, which steering needs, are continuous
 
 
@@ -55,9 +56,11 @@ class HeightMap:
         rows, columns = self.heights.shape
         return (columns - 1) * self.spacing, (rows - 1) * self.spacing
 
-    @property
+    @cached_property
     def grain(self) -> float:
-        return self.spacing
+        bend = (np.abs(np.diff(self.heights, 2, axis=k)).max(initial=0.0) for k in (0, 1))
+        twist = np.abs(np.diff(np.diff(self.heights, axis=0), axis=1)).max()
+        return self.spacing if max(*bend, twist) > _PLANE else np.inf
 
     def partial(self, x: ArrayLike, y: ArrayLike, i: int, j: int) -> Array:
         """d^(i+j) h / dx^i dy^j of the smooth surface, which passes through all grid points."""

@@ -51,7 +51,7 @@ class Mesh:
 
     @property
     def grain(self) -> float:
-        return self.spacing
+        return self.map.grain
 
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         return self.map.height(x, y)
