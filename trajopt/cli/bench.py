@@ -16,6 +16,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from trajopt.cli.sweep import KeepOld, Rerun, old_rows
+
 if TYPE_CHECKING:
     from trajopt.sweeps.drive import Progress as SweepProgress
 
@@ -60,6 +62,8 @@ def run(
     retry_failed: Annotated[
         bool, typer.Option(help="also run again what hung, raised or died")
     ] = False,
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
 ) -> None:
     """Run every search that has no row yet; started again after any interruption, it goes on."""
     from trajopt.bench.comparison import load_bench, run_bench
@@ -84,7 +88,8 @@ def run(
         def report(now: SweepProgress) -> None:
             bar.update(task, completed=now.finished, total=now.total)
 
-        found = run_bench(plan, place, jobs=jobs, retry_failed=retry_failed, progress=report)
+        options: dict[str, Any] = {"jobs": jobs, "retry_failed": retry_failed, "progress": report}
+        found = run_bench(plan, place, old=old_rows(rerun, keep_old), **options)
     console.print(", ".join(f"{count} {name}" for name, count in found.counts().items()))
 
 

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 from rich.console import Console
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from trajopt.sweeps.executors import Engine
     from trajopt.sweeps.store import Store
     from trajopt.sweeps.sweepfile import SweepPlan
+    from trajopt.sweeps.sweeps import Old
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -47,6 +48,8 @@ EngineName = Annotated[
         "--engine", help="processes, dask, dask-slurm, or tcp://host:port of a Dask scheduler"
     ),
 ]
+Rerun = Annotated[bool, typer.Option("--rerun", help="run cases again whose rows other code made")]
+KeepOld = Annotated[bool, typer.Option("--keep-old", help="keep rows that other code made")]
 Host = Annotated[str, typer.Option(help="address at which Dask's servers listen")]
 
 
@@ -57,6 +60,8 @@ def run(
     workers: Workers = 0,
     engine: EngineName = "processes",
     host: Host = "127.0.0.1",
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
     dry_run: Annotated[
         bool, typer.Option(help="show cases and an estimate of the time; store nothing")
     ] = False,
@@ -73,6 +78,7 @@ def run(
         store or _default_store(sweep_file),
         _engine(engine, workers, host),
         retry_failed=False,
+        old=old_rows(rerun, keep_old),
     )
 
 
@@ -83,6 +89,8 @@ def retry_failed(
     workers: Workers = 0,
     engine: EngineName = "processes",
     host: Host = "127.0.0.1",
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
 ) -> None:
     """Run cases again that failed, timed out or crashed, and those without a row."""
     from trajopt.sweeps.sweepfile import load_sweep
@@ -92,6 +100,7 @@ def retry_failed(
         store or _default_store(sweep_file),
         _engine(engine, workers, host),
         retry_failed=True,
+        old=old_rows(rerun, keep_old),
     )
 
 
@@ -107,6 +116,8 @@ def submit(
     partition: Annotated[str | None, typer.Option(help="Slurm partition")] = None,
     wait: Annotated[bool, typer.Option(help="wait until the array has ended")] = False,
     failed: Annotated[bool, typer.Option("--retry-failed", help="failed cases too")] = False,
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
 ) -> None:
     """Hand the missing cases to Slurm and return; nothing here needs to stay alive."""
     from trajopt.sweeps.host import CaseLimits
@@ -126,7 +137,9 @@ def submit(
         limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
         options=SlurmOptions(time_, memory, partition, at_once, elements),
         source=plan.text,
+        code=plan.code,
         retry_failed=failed,
+        old=old_rows(rerun, keep_old),
         wait=wait,
     )
     if not done.job:
@@ -228,6 +241,31 @@ def compact(store: StorePath) -> None:
 
 
 @app.command()
+def verify(store: StorePath) -> None:
+    """Read everything in a store and compare it with its checksums; exit code 1 for damage."""
+    from trajopt.sweeps.store import open_store
+    from trajopt.sweeps.upkeep import verify as verify_store
+
+    found = verify_store(open_store(store, create=False))
+    for damage in found:
+        console.print(str(damage))
+    if found:
+        raise typer.Exit(1)
+    console.print("whole")
+
+
+@app.command()
+def repair(store: StorePath) -> None:
+    """Take out what is damaged, with lists of the cases to run again, into <store>/damaged."""
+    from trajopt.sweeps.upkeep import repair as repair_store
+
+    found = repair_store(store)
+    for damage in found:
+        console.print(str(damage))
+    console.print("now run the sweep again: it fills the gaps" if found else "whole")
+
+
+@app.command()
 def export(
     store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]
 ) -> None:
@@ -269,12 +307,34 @@ def plot(
     console.print(f"written to {out}", highlight=False, soft_wrap=True)
 
 
-def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> None:
-    from trajopt.sweeps.store import open_store
-    from trajopt.sweeps.sweeps import missing, sweep
+def old_rows(rerun: bool, keep_old: bool) -> Old | None:
+    """What to do with cases whose rows other code made. Raises ArgumentError for both at once."""
+    if rerun and keep_old:
+        raise ArgumentError("--rerun", "--keep-old", "one of the two")
+    return "rerun" if rerun else "keep" if keep_old else None
 
-    place = open_store(store)
-    left = len(missing(plan.table, place, retry_failed=retry_failed))
+
+def _go(
+    plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool, old: Old | None
+) -> None:
+    from trajopt.sweeps.source import code_of
+    from trajopt.sweeps.store import open_store
+    from trajopt.sweeps.sweeps import OldCodeError, missing, sweep
+
+    place, code = open_store(store), code_of(plan.run, plan.code)
+    try:
+        left = len(missing(plan.table, place, code, retry_failed=retry_failed, old=old))
+    except OldCodeError as error:
+        if not sys.stdin.isatty():
+            raise
+        console.print(str(error))
+        answer = ""
+        while answer not in ("rerun", "keep", "stop"):
+            answer = typer.prompt("rerun, keep or stop")
+        if answer == "stop":
+            raise typer.Exit(2) from None
+        old = cast("Old", answer)
+        left = len(missing(plan.table, place, code, retry_failed=retry_failed, old=old))
     console.print(
         f"{plan.title}: {len(plan.table)} cases, {left} to run on {engine.name}; store {store}"
     )
@@ -286,7 +346,9 @@ def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> 
             store=place,
             time_limit=plan.time_limit,
             memory_limit=plan.memory_limit,
+            code=plan.code,
             retry_failed=retry_failed,
+            old=old,
             source=plan.text,
             progress=report,
         )
@@ -322,6 +384,7 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
             store=Path(folder) / "trial",
             time_limit=plan.time_limit,
             memory_limit=plan.memory_limit,
+            code=plan.code,
         )
         frame = store.frame(["run_seconds", "error", "error_message"])
     seconds = float(frame["run_seconds"].median())

@@ -1,8 +1,10 @@
 """Cases of a sweep: their values, their identity and their seeds.
 
 A case is a mapping of names to plain values. Its identity is a hash of that content together with
-what it is run on (problem, run function, code version); its seed comes from the identity. So
-nothing depends on the order of cases, on how they are chunked, or on how many workers there are.
+what it is run on (problem, name of the run function); its seed comes from the identity. So nothing
+depends on the order of cases, on how they are chunked, or on how many workers there are. A row also
+has the checksum of the code that made it (``source.py``): only rows of a case's present code count
+as its own, while its seed stays when the code changes.
 """
 
 from __future__ import annotations
@@ -102,12 +104,9 @@ def case_table(
     return table if len(first) == len(ids) else table.take(np.sort(first))
 
 
-def identity_base(run: str, problem: Any, code: str) -> bytes:
-    """What all identities of a sweep share: name of the run function, content of the problem, code
-    version."""
-    text = json.dumps(
-        [run, canonical("problem", problem), code], sort_keys=True, separators=(",", ":")
-    )
+def identity_base(run: str, problem: Any) -> bytes:
+    """What all identities of a sweep share: name of the run function, content of the problem."""
+    text = json.dumps([run, canonical("problem", problem)], sort_keys=True, separators=(",", ":"))
     return hashlib.blake2b(text.encode(), digest_size=ID_BYTES).digest()
 
 
@@ -119,8 +118,13 @@ def canonical(name: str, value: Any) -> Any:
     """
     if isinstance(value, np.generic):
         value = value.item()
-    if value is None or isinstance(value, (bool, str)):
+    if value is None or isinstance(value, bool):
         return value
+    if isinstance(value, str):
+        try:
+            return value if value.isascii() or value.encode() else ""
+        except UnicodeEncodeError:
+            raise ArgumentError(name, value, "a text that UTF-8 can hold") from None
     if isinstance(value, int):
         if not -_INT64 <= value < _INT64:
             raise ArgumentError(name, value, "a whole number of at most 64 bits")

@@ -13,7 +13,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ from trajopt.sweeps.host import (
     run_chunk,
     stop_mark,
 )
-from trajopt.sweeps.rows import CRASHED, Kind, failed_row, row_table
+from trajopt.sweeps.rows import CRASHED, Kind, Origin, failed_row, row_table
 from trajopt.sweeps.runfunction import Packed
 from trajopt.sweeps.store import Store
 from trajopt.sweeps.supervisor import warm_up
@@ -55,6 +55,21 @@ class Setup:
     run: Packed
     limits: CaseLimits
     parameter_kinds: Mapping[str, Kind]
+    code: str
+
+    def job(self, cases: CaseTable, kinds: Mapping[str, Kind], store: str) -> ChunkJob:
+        """A chunk of cases for a worker that sees the store at ``store``."""
+        return ChunkJob(
+            store,
+            chunk_name(cases),
+            cases,
+            self.run,
+            self.limits,
+            kinds,
+            self.parameter_kinds,
+            self.run_id,
+            self.code,
+        )
 
 
 @dataclass(frozen=True)
@@ -173,17 +188,10 @@ class Drive:
                 raise
 
     def _job(self, chunk: _Chunk) -> ChunkJob:
-        cases, setup = self.table.take(chunk.places), self.setup
-        return ChunkJob(
-            str(setup.store.path),
-            chunk_name(cases),
-            cases,
-            setup.run,
-            setup.limits,
-            dict(self.kinds),
-            setup.parameter_kinds,
-            str(stop_mark(setup.store.path, setup.run_id)),
-        )
+        setup = self.setup
+        mark = stop_mark(setup.store.path, setup.run_id)
+        job = setup.job(self.table.take(chunk.places), dict(self.kinds), str(setup.store.path))
+        return replace(job, stop_mark=str(mark))
 
     # -- outcomes
 
@@ -209,7 +217,8 @@ class Drive:
     def _learn(self, outcome: ChunkReport, chunk: _Chunk) -> None:
         self.counts.update(outcome.counts)
         for name, kind in outcome.kinds.items():
-            self.kinds.setdefault(name, kind)
+            if self.kinds.setdefault(name, kind) != kind:
+                self.kinds[name] = "text"
         finished = sum(outcome.counts.values())
         if outcome.unfinished and not self.stopping:  # stopped from outside: the rest runs again
             self.next_missing(chunk)
@@ -222,7 +231,7 @@ class Drive:
 
     def next_missing(self, chunk: _Chunk) -> None:
         """Queue those cases of a chunk that have no row yet."""
-        known = self.setup.store.finished()
+        known = self.setup.store.finished(where=("run_id", self.setup.run_id))
         left = chunk.places[~np.isin(self.table.ids[chunk.places], known)]
         if len(left):
             self.retried.append(_Chunk(left))
@@ -250,7 +259,8 @@ class Drive:
         cases = self.table.take(chunk.places)
         told = f"its worker died {chunk.deaths} times while running this case"
         row = failed_row(0, CRASHED, "WorkerDied", told, "", 0.0)._replace(attempts=chunk.deaths)
-        table = row_table([row], cases, self.setup.parameter_kinds, self.kinds, "submitter")
+        origin = Origin(self.setup.run_id, self.setup.code, "submitter")
+        table = row_table([row], cases, self.setup.parameter_kinds, self.kinds, origin)
         self.setup.store.write_part("parts", chunk_name(cases), table)
         self.counts[CRASHED] += 1
         if self.seconds_a_case is None:

@@ -45,6 +45,7 @@ class SweepPlan:
     table: CaseTable
     time_limit: float
     memory_limit: int | None
+    code: str | None
     text: str
 
 
@@ -77,7 +78,7 @@ def _plan(data: Mapping[str, Any], file: Path, text: str) -> SweepPlan:
     columns = with_derived(axes, derived, rules)
     if not columns or not len(next(iter(columns.values()))):
         raise ArgumentError("axes", dict(data.get("axes", {})), "axes that leave at least one case")
-    table = tabled(columns, run, data.get("code"), getattr(run, "content", None))
+    table = tabled(columns, run, getattr(run, "content", None))
     if "problem" in data:
         formulas = " ".join(map(str, [*derived.values(), *rules]))
         spare = [
@@ -90,6 +91,7 @@ def _plan(data: Mapping[str, Any], file: Path, text: str) -> SweepPlan:
         table,
         float(data.get("time_limit", TIME_LIMIT)),
         _bytes(data.get("memory_limit")),
+        data.get("code"),
         text,
     )
 
