@@ -141,7 +141,10 @@ def missing(
 
 def _without(table: CaseTable, rows: Any) -> IntArray:
     """Positions of cases that are not among rows."""
-    return np.flatnonzero(~np.isin(table.ids, np.asarray(rows["case"].to_numpy(), dtype="S32")))
+    pa = arrow()
+    stored = rows["case"].cast(pa.binary()).combine_chunks()  # hashed: a million in half a second
+    found = pa.compute.is_in(pa.array(table.ids.tolist(), pa.binary()), value_set=stored)
+    return np.flatnonzero(~found.to_numpy(zero_copy_only=False))
 
 
 class OldCodeError(StoreError):
