@@ -1,8 +1,8 @@
 """The store of a sweep: a directory of Parquet parts that is whole at every instant.
 
 - ``store.json``: format of the store
-- ``parts/*.parquet``: finished cases, one row a case; pandas, polars and DuckDB read them as they are
-- ``arrays/*.parquet``: arrays that run functions returned: case, start of its run, name, shape, values
+- ``parts/*.parquet``: finished cases, one row a case; pandas, polars, DuckDB read them as they are
+- ``arrays/*.parquet``: arrays of run functions: case, start of its run, name, shape, values
 - ``runs/*.json``: who ran what, with which versions and source, when
 - ``jobs/``: what Slurm array elements are to do
 - ``temporary/``: files being written; ``damaged/``: files that ``repair`` took out
