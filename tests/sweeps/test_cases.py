@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
+import time
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from trajopt.errors import ArgumentError, ProblemError
-from trajopt.sweeps.axes import axis_values, combined, with_derived
+from trajopt.schema import validated
+from trajopt.sweeps.axes import combined, with_derived
 from trajopt.sweeps.cases import case_table, identity_base
 from trajopt.sweeps.expressions import evaluate, parse
 from trajopt.sweeps.runfunction import name_of, packed, unpacked
-from trajopt.sweeps.sweepfile import RUN_CASE, load_sweep
+from trajopt.sweeps.sweepfile import RUN_CASE, SweepFile, load_sweep, sweep_schema
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -92,9 +96,19 @@ def test_bad_cases_are_refused(bad: Any) -> None:
         case_table(bad)
 
 
+def columns_of(**tables: Any) -> dict[str, Any]:
+    """Columns of the axes (and sample) of a file with these tables."""
+    file = validated(SweepFile, tables, "file")
+    return combined(file.axes, file.sample)
+
+
+def axis_values(name: str, axis: dict[str, Any]) -> Any:
+    return columns_of(axes={name: axis})[name]
+
+
 def test_product_zip_and_order() -> None:
-    columns = combined(
-        {
+    columns = columns_of(
+        axes={
             "a": {"values": [1, 2]},
             "b": {"values": [10, 20, 30], "zip": "g"},
             "c": {"values": ["x", "y", "z"], "zip": "g"},
@@ -131,9 +145,8 @@ def test_random_draws_have_their_distribution_and_seed() -> None:
 
 @pytest.mark.parametrize("method", ["latin-hypercube", "sobol"])
 def test_joint_samples_fill_every_stratum(method: str) -> None:
-    columns = combined(
-        {},
-        {
+    columns = columns_of(
+        sample={
             "method": method,
             "count": 64,
             "seed": 3,
@@ -146,7 +159,7 @@ def test_joint_samples_fill_every_stratum(method: str) -> None:
 
 def test_derived_and_excluded() -> None:
     columns = with_derived(
-        combined({"a.b": {"values": [1, 2, 3]}, "c": {"values": [0, 1]}}),
+        columns_of(axes={"a.b": {"values": [1, 2, 3]}, "c": {"values": [0, 1]}}),
         {"d": "[a.b + c, 2 * a.b]"},
         ["a.b == 2 and c > 0"],
     )
@@ -166,8 +179,8 @@ def test_derived_and_excluded() -> None:
     ],
 )
 def test_bad_axes_are_refused(axis: dict[str, Any]) -> None:
-    with pytest.raises(ArgumentError):
-        combined({"a": axis})
+    with pytest.raises(ProblemError, match=r"axes\.a"):
+        axis_values("a", axis)
 
 
 @pytest.mark.parametrize(
@@ -183,7 +196,7 @@ def test_bad_axes_are_refused(axis: dict[str, Any]) -> None:
     ],
 )
 def test_expressions(text: str, value: Any) -> None:
-    assert evaluate(parse(text), {"x": 3, "p.q": 7}) == value
+    assert evaluate(parse("key", text), {"x": 3, "p.q": 7}) == value
 
 
 @pytest.mark.parametrize(
@@ -199,11 +212,35 @@ def test_expressions(text: str, value: Any) -> None:
         "1 / 0",
         "x +",
         "f'{x}'",
+        "10**10**8",
+        "'%1000000000d' % 3",
+        "-" * 3000 + "3",
+        "-" * 300 + "3",
+        "(" * 250 + "3" + ")" * 250,
+        "+".join(["1"] * 600),
+        "9" * 5000,
+        "2 ** 64",
+        "2 ** 63",
+        "9223372036854775807 + 1",
+        "1e308 * 10",
+        "(-8) ** 0.5",
+        "[1] * 1000000000",
+        "'a' * 1000000000",
+        "round(5, -1000000000)",
+        "floor(1e300)",
+        "exp(1000)",
+        "sqrt(-1)",
+        "min([])",
+        "max('ab')",
+        "x < 'a'",
+        "x\0",
+        "",
+        "x" * 3000,
     ],
 )
-def test_expressions_run_no_code(text: str) -> None:
-    with pytest.raises(ArgumentError):
-        evaluate(parse(text), {"x": 3})
+def test_expressions_run_no_code_and_stay_small(text: str) -> None:
+    with pytest.raises(ArgumentError, match="key"):
+        evaluate(parse("key", text), {"x": 3})
 
 
 def test_example_sweep_files_load() -> None:
@@ -211,6 +248,93 @@ def test_example_sweep_files_load() -> None:
     assert files
     for file in files:
         assert len(load_sweep(file).table) > 1
+
+
+RUN = 'run = "tests.sweeps.run_functions:cheap"\n'
+AXES = "[axes.x]\nvalues = [1, 2]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[axes]\nx = 3", "axes.x = 3: expected a table"),
+        ("axes = 3", "axes = 3: expected a table"),
+        ("solve = 1\n" + AXES, "solve = 1: expected a table"),
+        ("derived = []\n" + AXES, r"derived = \[\]: expected a table"),
+        ("exclude = [1]\n" + AXES, r"exclude\[0\] = 1: expected a valid string"),
+        ('time_limit = "1 h"\n' + AXES, "time_limit = '1 h': expected a valid number"),
+        ("time_limit = -1\n" + AXES, "time_limit = -1: expected greater than 0"),
+        ('memory_limit = "much"\n' + AXES, "memory_limit = 'much': expected bytes"),
+        ('memory_limit = "1.2.3 GB"\n' + AXES, "memory_limit"),
+        ("memory_limit = -5\n" + AXES, "memory_limit = -5"),
+        ("code = 1\n" + AXES, "code = 1"),
+        ("title = 1\n" + AXES, "title = 1"),
+        ("problem = 1\n" + AXES, "problem = 1"),
+        ("run = 1\n", "run = 1"),
+        ("[axes.x]\nvalues = 3", "axes.x.values = 3: expected an array"),
+        ("[axes.x]\nvalues = []", r"axes.x.values = \[\]"),
+        ("[axes.x]\nvalue = [1]", "axes.x.value = .*the nearest is 'values'"),
+        ("[axes.x]\nvalues = [nan]", "nan|NaN"),
+        ("[axes.x]\nvalues = [inf]", "finite number"),
+        (f"[axes.x]\nvalues = [{2**63}]", "64 bits"),
+        (f"[axes.x]\nvalues = [{'9' * 5000}]", "digits"),
+        ("[axes.x]\nvalues = [2020-01-01]", "is a date"),
+        ("[axes.x]\nrange = [0, 1, 1.5]", r"axes.x.range\[2\] = 1.5"),
+        ("[axes.x]\nrange = [0, 1, 100000000]", r"axes.x.range\[2\]"),
+        ("[axes.x]\nrange = [-1e308, 1e308, 3]", "axes.x"),
+        ("[axes.x]\nlog = [0, 1, 3]", "axes.x.log"),
+        ("[axes.x]\nrange = [0, 1, 3]\nvalues = [1]", "axes.x = .*one of values, range"),
+        ("[axes.x.y]\nvalues = [1]", r"axes.x.y = .*quoted name"),
+        ("[axes.x]\nrandom = {uniform = [1, 0], count = 2, seed = 0}", "axes.x.random = "),
+        ("[axes.x]\nrandom = {uniform = [0, 1], count = 2}", "axes.x.random.seed = 'missing'"),
+        ("[axes.x]\nrandom = {gauss = [0, 1], count = 2, seed = 1}", "axes.x.random.gauss"),
+        ('[axes.""]\nvalues = [1]', "1 to 200 printable"),
+        ('[axes."a\\u0000b"]\nvalues = [1]', "1 to 200 printable"),
+        ('[axes.a]\nvalues = [1]\n[axes."a.b"]\nvalues = [1]', "axes.a = 'a.b'"),
+        ('[axes."x"]\nvalues = [1]\n[derived]\n"x.y" = "x"', "axes.x = 'x.y'"),
+        ("[sample]\nmethod = 'best'\ncount = 1\nseed = 1\naxes = {}", "sample.method = 'best'"),
+        ("[sample]\nmethod = 'random'\ncount = 1\nseed = 1\naxes = {}", "sample.axes"),
+        ("[derived]\ny = 3\n" + AXES, "derived.y = 3: expected a valid string"),
+        ("[derived]\ny = 'x +'\n" + AXES, r"derived.y = 'x \+'"),
+        ("[derived]\ny = '10**10**8'\n" + AXES, "derived.y"),
+        ("exclude = 'z > 1'\n" + AXES, r"exclude\[0\] = 'z > 1'.*none of the names x"),
+        ("a = " + "[" * 6000 + "]" * 6000, "nest"),
+        (".".join("a" * 20_000) + " = 1", "at most 32 parts"),
+        ("[" + ".".join(["'a'"] * 20_000) + "]", "at most 32 parts"),
+        ("a = " + "9" * 5000, "digits"),
+        ("\0", "valid TOML"),
+        ("#" + "x" * 1_000_001, "at most 1000000 bytes"),
+    ],
+)
+def test_every_line_of_a_sweep_file_is_checked(tmp_path: Path, text: str, words: str) -> None:
+    file = tmp_path / "sweep.toml"
+    file.write_text(text if "run = " in text else RUN + text)
+    started = time.perf_counter()
+    with pytest.raises(ProblemError, match=words) as told:
+        load_sweep(file)
+    assert time.perf_counter() - started < 2.0
+    assert str(told.value).startswith(f"{file}: ")
+    assert "\n" not in str(told.value)
+    assert len(str(told.value)) < 1000
+
+
+def test_files_that_cannot_be_read_are_told(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "latin").write_bytes(b"title = '\xe4'")
+    for name in ("", "loop", "missing", "nul\0", "latin", "x" * 300, "/dev/zero", "/dev/null"):
+        with pytest.raises(ProblemError):
+            load_sweep(tmp_path / name)
+    for value in (3, None, b"x", [1]):
+        with pytest.raises((ProblemError, TypeError)):
+            load_sweep(value)
+
+
+def test_the_schema_of_sweep_files_holds_the_shipped_ones() -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    kept = (ROOT / "problems" / "sweeps" / "sweep.schema.json").read_text()
+    assert kept == sweep_schema()
+    for file in (ROOT / "problems" / "sweeps").glob("*.toml"):
+        jsonschema.validate(tomllib.loads(file.read_text()), json.loads(kept))
 
 
 def sweep_file(folder: Path, text: str) -> Path:

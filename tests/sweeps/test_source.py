@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import subprocess
 import sys
 from functools import partial
@@ -130,7 +131,12 @@ def test_a_script_counts_itself(tmp_path: Path) -> None:
     for number, code in ((1, 0), (1, 0), (2, 1)):
         script.write_text(f"FACTOR = {number}\n" + text)
         done = subprocess.run(
-            [sys.executable, str(script)], cwd=ROOT, capture_output=True, text=True, check=False
+            [sys.executable, str(script)],
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert done.returncode == code, done.stderr
     assert "changed since: __main__" in done.stderr

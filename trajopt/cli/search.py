@@ -116,19 +116,25 @@ def validate(
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(help="problem or robot")] = "problem",
+    kind: Annotated[str, typer.Argument(help="problem, robot or sweep")] = "problem",
     out: Annotated[
         Path | None, typer.Option(help="file to write; standard output without it")
     ] = None,
 ) -> None:
-    """Print the JSON schema of problem or robot files, for editors."""
+    """Print the JSON schema of problem, robot or sweep files, for editors."""
     from trajopt.problem import problem_schema
     from trajopt.robots.description import RobotDescription
     from trajopt.schema import json_schema
+    from trajopt.sweeps.sweepfile import sweep_schema
 
-    if kind not in ("problem", "robot"):
-        raise ArgumentError("kind", kind, "problem or robot")
-    text = problem_schema() if kind == "problem" else json_schema(RobotDescription)
+    kinds = {
+        "problem": problem_schema,
+        "robot": lambda: json_schema(RobotDescription),
+        "sweep": sweep_schema,
+    }
+    if kind not in kinds:
+        raise ArgumentError("kind", kind, "one of " + ", ".join(kinds))
+    text = kinds[kind]()
     if out is None:
         sys.stdout.write(text)
     else:
