@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from tests.sweeps.crashes import cases, digest
 from tests.sweeps.run_functions import cheap, mixed
-from trajopt.checksum import DamageError, seal, unseal
 from trajopt.cli.sweep import app
+from trajopt.files import DamageError, seal, unseal
 from trajopt.sweeps.cases import Case
 from trajopt.sweeps.parts import PartError, StoreError
 from trajopt.sweeps.store import Store, open_store

@@ -13,8 +13,8 @@ import pandas as pd
 import pytest
 
 from tests.sweeps.run_functions import noop
-from trajopt.checksum import seal
 from trajopt.errors import ArgumentError
+from trajopt.files import seal
 from trajopt.sweeps.cases import Case, CaseTable, case_table
 from trajopt.sweeps.host import parameter_kinds
 from trajopt.sweeps.parts import StoreError, rows_in

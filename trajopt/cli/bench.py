@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -16,12 +15,11 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from trajopt.cli.shared import console
 from trajopt.cli.sweep import KeepOld, Rerun, old_rows
 
 if TYPE_CHECKING:
     from trajopt.sweeps.drive import Progress as SweepProgress
-
-console = Console()
 
 RUN = "run"
 BEST_KNOWN = Path("trajopt") / "bench" / "best_known.json"  # in a checkout
@@ -107,7 +105,7 @@ def report(
     from trajopt.sweeps.store import open_store
 
     page = write_report(open_store(store, create=False), out or store / "report")
-    console.print(f"written to {page}", highlight=False, soft_wrap=True)
+    console.print(f"written to {page}", soft_wrap=True)
 
 
 @app.command("best")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -11,10 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
+from trajopt.cli.shared import console, leaving
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
+from trajopt.report.words import PlainConsole, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,8 +31,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Run a study over many cases, on one machine or on a cluster, and lose nothing.",
 )
-console = Console()
-
+_KEPT = "interrupted: finished cases are kept, the same command goes on; once more: at once"
+_SUBMITTED = "interrupted: finished cases are kept; an array that was submitted goes on"
 _SHOWN = 5  # cases shown by --dry-run
 
 SweepFile = Annotated[Path, typer.Argument(help="sweep file (*.toml)", show_default=False)]
@@ -130,18 +131,19 @@ def submit(
         raise ArgumentError("--slurm", False, "--slurm: job arrays are submitted to Slurm only")
     plan = load_sweep(sweep_file)
     place = open_store(store or _default_store(sweep_file))
-    done = hand_over(
-        plan.table,
-        plan.run,
-        place,
-        limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
-        options=SlurmOptions(time_, memory, partition, at_once, elements),
-        source=plan.text,
-        code=plan.code,
-        retry_failed=failed,
-        old=old_rows(rerun, keep_old),
-        wait=wait,
-    )
+    with leaving(_SUBMITTED):
+        done = hand_over(
+            plan.table,
+            plan.run,
+            place,
+            limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
+            options=SlurmOptions(time_, memory, partition, at_once, elements),
+            source=plan.text,
+            code=plan.code,
+            retry_failed=failed,
+            old=old_rows(rerun, keep_old),
+            wait=wait,
+        )
     if not done.job:
         console.print("nothing is missing")
     else:
@@ -197,7 +199,7 @@ def show(
         shown.add_row(name, f"array {array.shape}")
     console.print(shown)
     if row.get("error_traceback"):
-        console.print(row["error_traceback"], markup=False, highlight=False)
+        console.print(row["error_traceback"])
 
 
 def report(
@@ -228,7 +230,7 @@ def report(
             open_store(place, create=False), case, out or Path("out") / "report" / case, plan
         )
     for file in files:
-        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
+        console.print(f"wrote {file}", soft_wrap=True)
 
 
 @app.command()
@@ -273,18 +275,19 @@ def export(
     from trajopt.sweeps.store import open_store
 
     place = open_store(store, create=False)
-    match out.suffix:
-        case ".csv":
-            place.frame().to_csv(out, index=False)
-        case ".jsonl":
-            place.frame().to_json(out, orient="records", lines=True, date_format="iso")
-        case ".parquet":
-            import pyarrow.parquet as pq
+    if out.suffix not in (".csv", ".parquet", ".jsonl"):
+        raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
+    with whole_file(out) as part:
+        match out.suffix:
+            case ".csv":
+                place.frame().to_csv(part, index=False)
+            case ".jsonl":
+                place.frame().to_json(part, orient="records", lines=True, date_format="iso")
+            case ".parquet":
+                import pyarrow.parquet as pq
 
-            pq.write_table(place.table(), out)
-        case _:
-            raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
-    console.print(f"written to {out}", highlight=False, soft_wrap=True)
+                pq.write_table(place.table(), part)
+    console.print(f"written to {out}", soft_wrap=True)
 
 
 @app.command()
@@ -304,7 +307,7 @@ def plot(
     from trajopt.report.sweeps import draw
 
     draw(store, out, value=value, x=x, y=y, by=by, pair=pair)
-    console.print(f"written to {out}", highlight=False, soft_wrap=True)
+    console.print(f"written to {out}", soft_wrap=True)
 
 
 def old_rows(rerun: bool, keep_old: bool) -> Old | None:
@@ -338,7 +341,7 @@ def _go(
     console.print(
         f"{plan.title}: {len(plan.table)} cases, {left} to run on {engine.name}; store {store}"
     )
-    with _ending_cleanly(), _bar(left) as report:
+    with leaving(_KEPT), _bar(left) as report:
         sweep(
             plan.table,
             plan.run,
@@ -376,7 +379,7 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
             *(f"{v:.6g}" if isinstance(v, float) else str(v) for v in case.values.values()),
         )
     console.print(shown)
-    with tempfile.TemporaryDirectory() as folder, _ending_cleanly():
+    with tempfile.TemporaryDirectory() as folder, leaving("interrupted"):
         store = sweep(
             sampled(plan.table),
             plan.run,
@@ -395,7 +398,10 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
     )
     for _, row in frame[frame["status"] != "done"].iterrows():
         console.print(
-            f"[red]{row['status']}[/red] {row['case'][:12]}: {row['error']}: {row['error_message']}"
+            words(
+                (row["status"], "red"),
+                f" {row['case'][:12]}: {row['error']}: {row['error_message']}",
+            )
         )
 
 
@@ -433,16 +439,6 @@ def _engine(name: str, workers: int, host: str) -> Engine:
 
 
 @contextmanager
-def _ending_cleanly() -> Iterator[None]:
-    """SIGTERM ends a sweep as Ctrl-C does: finished cases are kept."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-@contextmanager
 def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
     """Progress with rate and remaining time on a terminal; a line a minute where there is none."""
     from rich import progress as bars
@@ -453,7 +449,7 @@ def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
         bars.MofNCompleteColumn(),
         bars.TextColumn("{task.fields[rate]}"),
         bars.TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=PlainConsole(stderr=True),
         disable=not sys.stderr.isatty(),
     )
     task: Any = bar.add_task("", total=total, failed="", rate="")

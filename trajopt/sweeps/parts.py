@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from trajopt.checksum import digest
 from trajopt.errors import TrajoptError
+from trajopt.files import digest
 from trajopt.sweeps.rows import arrow
 
 _NAME = re.compile(r"(\w+)-(\d+)-[0-9a-f]{8}-([0-9a-f]{32})\.parquet")

@@ -27,8 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.arrays import IntArray
-from trajopt.checksum import DamageError, digest
 from trajopt.errors import ArgumentError, TrajoptError
+from trajopt.files import DamageError, digest
 from trajopt.sweeps.cases import CaseTable
 from trajopt.sweeps.child import THREAD_VARIABLES
 from trajopt.sweeps.drive import MOST_CASES, Setup, sampled
@@ -43,6 +43,7 @@ from trajopt.sweeps.upkeep import align
 
 CHUNK_SECONDS = 5.0  # work between two parts of an element: what a killed element loses; chosen
 ELEMENT_SECONDS = 300.0  # work of an element, against the 0.5 s that Slurm takes for one; chosen
+_WAIT = 2.0  # s between looks at the queue; chosen
 MOST_ELEMENTS = 1000  # Slurm's default MaxArraySize is 1001
 
 
@@ -66,6 +67,31 @@ class SlurmOptions:
     def __post_init__(self) -> None:
         if not 0 <= self.elements <= MOST_ELEMENTS:
             raise ArgumentError("elements", self.elements, f"0 .. {MOST_ELEMENTS}")
+        for name in ("time", "memory", "partition", "extra"):
+            value = getattr(self, name)
+            texts = value if name == "extra" else () if value is None else (value,)
+            if not all(isinstance(t, str) and t and t.isprintable() for t in texts):
+                raise ArgumentError(name, value, "a text in one line, as sbatch takes it")
+
+    def arguments(self, folder: Path, count: int) -> list[str]:
+        """Arguments of sbatch for ``count`` elements that log into ``folder``. Never read by a
+        shell. Raises ArgumentError for a folder that Slurm cannot be told."""
+        if "\\" in str(folder) or not str(folder).isprintable():
+            raise ArgumentError("store", str(folder), "a printable path without backslashes")
+        limit = f"%{self.at_once}" if self.at_once else ""
+        return [
+            "--job-name=trajopt-sweep",
+            f"--array=0-{count - 1}{limit}",
+            "--ntasks=1",
+            "--cpus-per-task=1",
+            f"--mem={self.memory}",
+            f"--time={self.time}",
+            "--requeue",
+            "--open-mode=append",
+            f"--output={str(folder).replace('%', '%%')}/element-%a.log",
+            *([f"--partition={self.partition}"] if self.partition else []),
+            *self.extra,
+        ]
 
 
 @dataclass(frozen=True)
@@ -125,12 +151,15 @@ def submit(
         store.write(f"jobs/{folder.name}/element-{number}.log", b"")
         todo = pickle.dumps(jobs[number::count])
         store.write(f"jobs/{folder.name}/element-{number}.pickle", digest(todo).encode() + todo)
-    script = _script(folder, count, options)
-    store.write(f"jobs/{folder.name}/array.sh", script.encode())
-    job = _sbatch(folder / "array.sh", wait)
-    if wait:
-        align(store)
+    store.write(f"jobs/{folder.name}/array.sh", _script(folder).encode())
+    job = _sbatch(folder / "array.sh", options.arguments(folder.resolve(), count))
     close_record(store, run_id, f"submitted as job {job}", {})
+    if wait:
+        while subprocess.run(
+            ["squeue", "--noheader", f"--jobs={job}"], capture_output=True, text=True, check=False
+        ).stdout.strip():
+            time.sleep(_WAIT)
+        align(store)
     return Submission(job, count, len(places), folder)
 
 
@@ -211,36 +240,24 @@ def _chunks(
     ]
 
 
-def _script(folder: Path, count: int, options: SlurmOptions) -> str:
+def _script(folder: Path) -> str:
     place = folder.resolve()
     program = (
         f"import sys; sys.path[:] = {list(sys.path)!r}; from trajopt.sweeps.slurm import element; "
         f"sys.exit(element({str(place)!r}, int(sys.argv[1])))"
     )
-    limit = f"%{options.at_once}" if options.at_once else ""
     lines = [
         "#!/bin/bash",
-        "#SBATCH --job-name=trajopt-sweep",
-        f"#SBATCH --array=0-{count - 1}{limit}",
-        "#SBATCH --ntasks=1",
-        "#SBATCH --cpus-per-task=1",
-        f"#SBATCH --mem={options.memory}",
-        f"#SBATCH --time={options.time}",
-        "#SBATCH --requeue",
-        "#SBATCH --open-mode=append",
-        f"#SBATCH --output={place}/element-%a.log",
-        *([f"#SBATCH --partition={options.partition}"] if options.partition else []),
-        *(f"#SBATCH {extra}" for extra in options.extra),
         *(f"export {name}=1" for name in THREAD_VARIABLES),
         f'exec {shlex.quote(sys.executable)} -c {shlex.quote(program)} "$SLURM_ARRAY_TASK_ID"',
     ]
     return "\n".join(lines) + "\n"
 
 
-def _sbatch(script: Path, wait: bool) -> str:
-    command = ["sbatch", "--parsable", *(["--wait"] if wait else []), str(script)]
+def _sbatch(script: Path, arguments: Sequence[str]) -> str:
+    command = ["sbatch", "--parsable", *arguments, str(script)]
     told = subprocess.run(command, capture_output=True, text=True, check=False)
     job = told.stdout.strip().split(";")[0]
-    if not job or (told.returncode != 0 and not wait):
+    if not job or told.returncode != 0:
         raise SlurmError(f"sbatch refused {script}: {told.stderr.strip() or told.stdout.strip()}")
     return job

@@ -25,8 +25,8 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from trajopt.checksum import digest
 from trajopt.errors import ArgumentError
+from trajopt.files import digest
 from trajopt.provenance import versions
 from trajopt.sweeps.runfunction import RunFunction, name_of
 

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trajopt.arrays import Array, BoolArray
-from trajopt.checksum import DamageError, seal, unseal
+from trajopt.files import DamageError, seal, unseal
 from trajopt.sweeps.merging import one_row_a_case, united
 from trajopt.sweeps.parts import StoreError, chunk_of, encoded, part_table, parts_in
 from trajopt.sweeps.rows import DONE, KEY_COLUMNS, RUN_COLUMNS, arrow

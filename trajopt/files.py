@@ -1,10 +1,14 @@
-"""Checksums of files, and JSON that carries its own: damage is noticed, not read."""
+"""Files that are whole or not there, and checksums: damage is noticed, not read."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from trajopt.errors import TrajoptError
@@ -14,6 +18,31 @@ _KEY = "checksum"  # the key of sealed JSON that the checksum of all others stan
 
 class DamageError(TrajoptError):
     """A file does not hold what was written."""
+
+
+@contextmanager
+def whole_file(file: Path) -> Iterator[Path]:
+    """A name beside ``file`` to write under, with the same suffix: becomes ``file`` when all is
+    written, and goes where that fails."""
+    part = file.with_name(f".part-{os.getpid()}-{file.name}")
+    try:
+        yield part
+        os.replace(part, file)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def file_name(name: str) -> str:
+    """A name for a file out of any text, in no other folder: other characters than letters, digits,
+    ``_``, ``-`` and ``.`` become ``_``, and a checksum tells such names apart.
+
+    >>> file_name("track"), file_name("../track")
+    ('track', '_.._track-87273933')
+    """
+    plain = re.sub(r"[^\w.-]", "_", name)[:100]
+    if plain == name and not plain.startswith("."):
+        return name
+    return f"_{plain}-{digest(name.encode(errors='backslashreplace'))[:8]}"
 
 
 def digest(data: bytes) -> str:
