@@ -366,7 +366,6 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
 
     import numpy as np
 
-    from trajopt.sweeps.drive import sampled
     from trajopt.sweeps.executors import available_processors
     from trajopt.sweeps.sweeps import sweep
 
@@ -381,7 +380,7 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
     console.print(shown)
     with tempfile.TemporaryDirectory() as folder, leaving("interrupted"):
         store = sweep(
-            sampled(plan.table),
+            plan.table.sampled(),
             plan.run,
             executor=1,
             store=Path(folder) / "trial",

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from trajopt.arrays import AnyArray, IntArray
 from trajopt.errors import ArgumentError
 
+SAMPLED = 3  # cases run first, to learn their time and columns
 ID_BYTES = 16  # 128 bit: two of 1e9 cases collide with probability 1e-21
 _BLOCK = 20_000  # cases hashed at a time, to bound memory; chosen
 _INT64 = 2**63
@@ -69,6 +70,15 @@ class CaseTable:
             {name: column[positions] for name, column in self.columns.items()}, self.ids[positions]
         )
 
+    @property
+    def name(self) -> str:
+        """Name of a chunk of these cases: a hash of their identities."""
+        return hashlib.blake2b(self.ids.tobytes(), digest_size=8).hexdigest()
+
+    def sampled(self) -> CaseTable:
+        """First, middle and last case, for estimates."""
+        return self.take(spread(len(self)))
+
     def rows(self) -> list[Case]:
         """All cases, one object each."""
         names = list(self.columns)
@@ -78,6 +88,11 @@ class CaseTable:
             Case(key.decode(), dict(zip(names, row, strict=True)))
             for key, row in zip(self.ids.tolist(), values, strict=True)
         ]
+
+
+def spread(count: int) -> IntArray:
+    """SAMPLED positions or fewer, from the first to the last of ``count``."""
+    return np.unique(np.linspace(0, count - 1, min(SAMPLED, count)).round().astype(np.int64))
 
 
 def case_table(

@@ -7,7 +7,6 @@ halves that die are halved again, until the one case whose worker always dies is
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -21,7 +20,7 @@ import numpy as np
 
 from trajopt.arrays import IntArray
 from trajopt.errors import TrajoptError
-from trajopt.sweeps.cases import CaseTable
+from trajopt.sweeps.cases import SAMPLED, CaseTable, spread
 from trajopt.sweeps.executors import Engine, end, is_death, started
 from trajopt.sweeps.host import (
     RETRIES,
@@ -36,7 +35,6 @@ from trajopt.sweeps.runfunction import Packed
 from trajopt.sweeps.store import Store
 from trajopt.sweeps.supervisor import warm_up
 
-SAMPLED = 3  # cases run first, to learn their time and columns
 # s of work; chosen: a part costs some 10 ms, a crash costs a chunk
 SHORTEST_CHUNK, LONGEST_CHUNK = 0.25, 5.0
 _SHARE = 4  # a chunk is a quarter of what is left for its worker: large first; chosen
@@ -61,7 +59,7 @@ class Setup:
         """A chunk of cases for a worker that sees the store at ``store``."""
         return ChunkJob(
             store,
-            chunk_name(cases),
+            cases.name,
             cases,
             self.run,
             self.limits,
@@ -147,7 +145,7 @@ class Drive:
 
     def _sample_first(self) -> None:
         """Bring a first, a middle and a last case to the front."""
-        front = _spread(len(self.places))
+        front = spread(len(self.places))
         self.places = np.concatenate([self.places[front], np.delete(self.places, front)])
 
     def _waiting(self) -> bool:
@@ -261,7 +259,7 @@ class Drive:
         row = failed_row(0, CRASHED, "WorkerDied", told, "", 0.0)._replace(attempts=chunk.deaths)
         origin = Origin(self.setup.run_id, self.setup.code, "submitter")
         table = row_table([row], cases, self.setup.parameter_kinds, self.kinds, origin)
-        self.setup.store.write_part("parts", chunk_name(cases), table)
+        self.setup.store.write_part("parts", cases.name, table)
         self.counts[CRASHED] += 1
         if self.seconds_a_case is None:
             self.seconds_a_case = SHORTEST_CHUNK
@@ -304,18 +302,3 @@ class Drive:
             for future in done:
                 with contextlib.suppress(Exception):
                     self._learn(future.result(timeout=0), flights[future])
-
-
-def chunk_name(cases: CaseTable) -> str:
-    """Name of a chunk: a hash of its cases' identities."""
-    return hashlib.blake2b(cases.ids.tobytes(), digest_size=8).hexdigest()
-
-
-def sampled(table: CaseTable) -> CaseTable:
-    """First, middle and last case of a table, for estimates."""
-    return table.take(_spread(len(table)))
-
-
-def _spread(count: int) -> IntArray:
-    """SAMPLED positions or fewer, from the first to the last of ``count``."""
-    return np.unique(np.linspace(0, count - 1, min(SAMPLED, count)).round().astype(np.int64))

@@ -31,7 +31,7 @@ from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.files import DamageError, digest
 from trajopt.sweeps.cases import CaseTable
 from trajopt.sweeps.child import THREAD_VARIABLES
-from trajopt.sweeps.drive import MOST_CASES, Setup, sampled
+from trajopt.sweeps.drive import MOST_CASES, Setup
 from trajopt.sweeps.host import CaseLimits, ChunkJob, parameter_kinds, run_chunk
 from trajopt.sweeps.rows import arrow
 from trajopt.sweeps.runfunction import RunFunction, name_of, packed
@@ -212,7 +212,7 @@ def _sampled_seconds(
     code: str | None,
     choice: Mapping[str, Any],
 ) -> float:
-    trial = sampled(table)
+    trial = table.sampled()
     sweep(
         trial,
         run,
