@@ -45,9 +45,10 @@ format: $(READY)  ## rewrite all Python files in the project's form
 lines: $(READY)  ## lines of code of trajopt/, without blanks, comments, docstrings
 	$(BIN)/python tests/code_lines.py trajopt
 
-schema: $(READY)  ## rewrite the JSON schemas of problem and robot files
+schema: $(READY)  ## rewrite the JSON schemas of problem, robot and sweep files
 	$(BIN)/trajopt schema problem --out problems/problem.schema.json
 	$(BIN)/trajopt schema robot --out trajopt/robots/robot.schema.json
+	$(BIN)/trajopt schema sweep --out problems/sweeps/sweep.schema.json
 
 pictures: $(READY)  ## rewrite the pictures of README.md (the climb study's: after its sweep, see benchmarks/readme_pictures.py)
 	$(BIN)/python -m benchmarks.readme_pictures

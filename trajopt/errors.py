@@ -30,7 +30,7 @@ class ArgumentError(TrajoptError, ValueError):
 
     def __init__(self, argument: str, value: Any, expected: str) -> None:
         self.argument, self.value, self.expected = argument, value, expected
-        super().__init__(f"{argument} = {_short(value)}: expected {expected}")
+        super().__init__(printable(f"{_cut(argument)} = {_short(value)}: expected {expected}"))
 
 
 class ProblemError(TrajoptError, ValueError):
@@ -41,7 +41,7 @@ class ProblemError(TrajoptError, ValueError):
 
     def __init__(self, file: str, key: str, value: Any, expected: str) -> None:
         self.file, self.key, self.value, self.expected = file, key, value, expected
-        super().__init__(f"{file}: {key} = {_short(value)}: expected {expected}")
+        super().__init__(printable(f"{file}: {_cut(key)} = {_short(value)}: expected {expected}"))
 
 
 class InfeasibleError(TrajoptError):
@@ -74,6 +74,26 @@ class SimulationError(TrajoptError):
     """A physics engine could not run the scene, or its result is not a motion (NaN, explosion)."""
 
 
-def _short(value: Any, limit: int = 120) -> str:
-    text = repr(value)
+def printable(text: str, spared: str = "") -> str:
+    r"""``text`` with control characters (but the ``spared`` ones) as escapes, so that no name or
+    message moves the cursor, changes colours or starts a new line.
+
+    >>> print(printable("a\nb\x1b[31m"))
+    a\nb\x1b[31m
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        c if c.isprintable() or c in spared else c.encode("unicode_escape").decode() for c in text
+    )
+
+
+def _short(value: Any) -> str:
+    try:
+        return _cut(repr(value))
+    except Exception:  # integers of 5,000 digits, lists nested too deep, objects of others
+        return f"a {type(value).__name__} that cannot be shown"
+
+
+def _cut(text: str, limit: int = 120) -> str:
     return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -10,6 +10,8 @@ from __future__ import annotations
 import copy
 import difflib
 import json
+import os
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -28,7 +30,10 @@ Share = Annotated[float, Field(gt=0, le=1)]
 Point = tuple[float, float]
 Point3 = tuple[float, float, float]
 
-LARGEST_FILE = 4_000_000  # bytes of a TOML file; chosen, a thousand times the shipped ones
+LARGEST_FILE = 1_000_000  # bytes of a TOML file; chosen, a hundred times the shipped ones
+MOST_PARTS = 32  # of a dotted key; chosen, eight times what any file has
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_PART}){{{MOST_PARTS}}}")
 EVERY = "all"  # as a name in a dotted key: every element of an array of tables
 
 
@@ -51,24 +56,41 @@ def as_problem_error(error: PydanticCustomError, file: str) -> ProblemError:
     return ProblemError(file, rule["key"], rule["given"], rule["expected"])
 
 
-def read_tables(path: str | Path, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Tables of a TOML file with ``overrides`` (dotted keys) applied. Raises ProblemError."""
+def read_text(path: str | Path) -> str:
+    """Text of a file, at most LARGEST_FILE bytes of it. Raises ProblemError."""
     try:
-        if Path(path).stat().st_size > LARGEST_FILE:
-            raise ProblemError(
-                str(path), "file", f"{Path(path).stat().st_size} bytes", f"up to {LARGEST_FILE}"
-            )
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        with open(Path(path), "rb") as file:  # a number would be an open file
+            data = file.read(LARGEST_FILE + 1)  # not more, also of a device without end
+        if len(data) > LARGEST_FILE:
+            raise ProblemError(str(path), "file", "larger", f"at most {LARGEST_FILE} bytes")
+        return data.decode()
     except FileNotFoundError:
         raise ProblemError(str(path), "file", "missing", "an existing file (*.toml)") from None
     except IsADirectoryError:
         raise ProblemError(str(path), "file", "a directory", "a file (*.toml)") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+    except UnicodeDecodeError as error:
         raise ProblemError(str(path), "file", str(error), "valid TOML in UTF-8") from None
     except (OSError, TypeError, ValueError) as error:
         if isinstance(error, ProblemError):
             raise
         raise ProblemError(str(path), "file", str(error), "a readable file (*.toml)") from None
+
+
+def tables_of(text: str, file: str) -> dict[str, Any]:
+    """Tables of TOML text. Raises ProblemError."""
+    if _LONG_KEY.search(text):  # tomllib's time grows with the square of a key's parts
+        raise ProblemError(file, "file", "a longer key", f"keys of at most {MOST_PARTS} parts")
+    try:
+        return tomllib.loads(text.replace("\r\n", "\n"))
+    except RecursionError:
+        raise ProblemError(file, "file", "deeper nesting", "tables nested less deep") from None
+    except ValueError as error:  # no TOML, or numbers that are no numbers
+        raise ProblemError(file, "file", str(error), "valid TOML in UTF-8") from None
+
+
+def read_tables(path: str | Path, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Tables of a TOML file with ``overrides`` (dotted keys) applied. Raises ProblemError."""
+    data = tables_of(read_text(path), str(path))
     for key, value in (overrides or {}).items():
         set_key(data, key, value, str(path))
     return data
@@ -81,6 +103,8 @@ def set_key(data: dict[str, Any], dotted: str, value: Any, file: str) -> None:
     Unknown names of keys are left to validation. Raises ProblemError for a key below no table.
     """
     *parents, last = dotted.split(".")
+    if len(parents) >= MOST_PARTS:
+        raise ProblemError(file, dotted, value, f"a key of at most {MOST_PARTS} parts")
     for table in _tables(data, parents, dotted, value, file):
         if value is None:
             table.pop(last, None)
@@ -131,7 +155,7 @@ def validated(model: type[Model], data: Mapping[str, Any], file: str) -> Model:
         return model.model_validate_json(text, strict=True)
     except ValidationError as error:
         raise translated(error, file, model) from None
-    except (RecursionError, ValueError) as error:
+    except (RecursionError, TypeError, ValueError) as error:
         if isinstance(error, ProblemError):
             raise
         raise ProblemError(file, "file", str(error), "tables of plain values") from None
@@ -193,20 +217,28 @@ def _models(annotation: Any) -> Iterator[Any]:
     """The models in an annotation: of an optional section, an array of them, a union."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
-    elif get_origin(annotation) in (tuple, Union, UnionType, Annotated):
+    elif get_origin(annotation) in (tuple, dict, Union, UnionType, Annotated):
         for part in get_args(annotation):
             yield from _models(part)
 
 
 def _as_json(value: Any) -> Any:
-    """NumPy values and sections as JSON; anything else as text, which validation then refuses."""
+    """NumPy values, sections and paths as JSON. Raises TypeError for anything else."""
     if isinstance(value, BaseModel):
         return value.model_dump(mode="json", exclude_none=True)
-    return value.tolist() if hasattr(value, "tolist") else str(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise TypeError(f"{value} is a {type(value).__name__}")
 
 
 def _joined(location: tuple[int | str, ...]) -> str:
     text = ""
     for part in location:
-        text += f"[{part}]" if isinstance(part, int) else (f".{part}" if text else part)
+        if isinstance(part, int):
+            text += f"[{part}]"
+            continue
+        part = part if re.fullmatch(r"[\w-]+", part) else json.dumps(part, ensure_ascii=False)
+        text += f".{part}" if text else part
     return text

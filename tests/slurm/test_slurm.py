@@ -50,7 +50,7 @@ def table_of_one_process(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_an_array_gives_the_same_table(tmp_path: Path, table_of_one_process: str) -> None:
     store = swept("slurm", 2000, tmp_path)
     assert digest(store) == table_of_one_process
-    table = tabled(cases(2000), paced_mixed, None, None)
+    table = tabled(cases(2000), paced_mixed, None)
     again = submit(
         table, paced_mixed, store, limits=LIMITS, options=SlurmOptions(), case_seconds=0.05
     )
@@ -66,7 +66,7 @@ def test_dask_on_slurm_gives_the_same_table(tmp_path: Path, table_of_one_process
 @pytest.mark.slow
 def test_a_requeued_element_goes_on(tmp_path: Path) -> None:
     store = open_store(tmp_path / "array")
-    table = tabled(cases(2000), paced, None, None)
+    table = tabled(cases(2000), paced, None)
     done = submit(
         table,
         paced,

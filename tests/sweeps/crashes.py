@@ -28,8 +28,6 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import pandas as pd
-
 from tests.sweeps.run_functions import paced
 from trajopt.sweeps.executors import Engine, dask_local, processes
 from trajopt.sweeps.host import CaseLimits
@@ -65,12 +63,11 @@ def digest(store: Store) -> str:
     table.select(sorted(set(table.column_names) - set(RUN_COLUMNS))).to_pandas().to_csv(
         text, index=False
     )
-    arrays = [pd.read_parquet(p) for p in store.parts("arrays")]
-    if arrays:
-        beside = pd.concat(arrays).drop_duplicates(["case", "name"]).sort_values(["case", "name"])
-        beside.assign(**{c: beside[c].map(list) for c in ("shape", "values")}).to_csv(
-            text, index=False
-        )
+    beside = store.arrays()
+    if len(beside):
+        frame = beside.drop_columns(["run_started"]).to_pandas()
+        frame = frame.assign(**{c: frame[c].map(list) for c in ("shape", "values")})
+        frame.to_csv(text, index=False)
     return hashlib.sha256(text.getvalue().encode()).hexdigest()
 
 
@@ -263,7 +260,7 @@ def main() -> int:
     parser.add_argument("--work", help="internal: run the sweep itself in this store")
     options = parser.parse_args()
     if options.work and options.engine == "slurm":
-        table = tabled(cases(options.cases), paced, None, None)
+        table = tabled(cases(options.cases), paced, None)
         submit(
             table,
             paced,

@@ -35,6 +35,12 @@ def paced(case: Case) -> dict[str, Any]:
     return cheap(case)
 
 
+def waiting(case: Case) -> dict[str, Any]:
+    """``cheap``, 0.2 s long."""
+    time.sleep(0.2)
+    return cheap(case)
+
+
 def mixed(case: Case) -> dict[str, Any]:
     """``cheap`` with arrays, and an error now and then."""
     if case["x"] % 97 == 5:

@@ -44,7 +44,7 @@ def swept(engine: str, count: int, folder: Path) -> Store:
                 executor=dask_slurm(1, memory="1GB", directory=str(folder)),
             )
         case "slurm":
-            table = tabled(cases(count), paced_mixed, None, None)
+            table = tabled(cases(count), paced_mixed, None)
             submit(
                 table,
                 paced_mixed,

@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow.parquet as pq
 import pytest
 
 from tests.sweeps.run_functions import noop
+from trajopt.errors import ArgumentError
+from trajopt.files import seal
 from trajopt.sweeps.cases import Case, CaseTable, case_table
 from trajopt.sweeps.host import parameter_kinds
-from trajopt.sweeps.rows import DONE, ERROR, Row, array_table, fitted, result_kinds, row_table
-from trajopt.sweeps.store import Store, StoreError, open_store
+from trajopt.sweeps.parts import StoreError, rows_in
+from trajopt.sweeps.rows import (
+    DONE,
+    ERROR,
+    Origin,
+    Row,
+    array_table,
+    result_kinds,
+    results_of,
+    row_table,
+)
+from trajopt.sweeps.store import Store, open_store
 from trajopt.sweeps.sweeps import sweep
+from trajopt.sweeps.upkeep import align
 
 
 def write(store: Store, cases: CaseTable, rows: list[Row], name: str = "chunk") -> None:
@@ -27,9 +38,8 @@ def write(store: Store, cases: CaseTable, rows: list[Row], name: str = "chunk") 
     beside = array_table(rows, cases)
     if beside is not None:
         store.write_part("arrays", name, beside)
-    store.write_part(
-        "parts", name, row_table(fitted(rows, kinds), cases, parameter_kinds(cases), kinds, "host")
-    )
+    origin = Origin("run", "code", "host")
+    store.write_part("parts", name, row_table(rows, cases, parameter_kinds(cases), kinds, origin))
 
 
 @pytest.fixture
@@ -93,17 +103,6 @@ def test_one_row_a_case_finished_before_failed_then_latest(store: Store, cases: 
     assert len(store.finished(with_failed=False)) == 1
 
 
-def test_names_of_results_do_not_hide_parameters(store: Store, cases: CaseTable) -> None:
-    write(store, cases, [Row(0, DONE, {"x": 7.0, "status": "fine"}, {})])
-    row = store.frame().iloc[0]
-    assert (row["x"], row["result.x"], row["status"], row["result.status"]) == (
-        0,
-        7.0,
-        DONE,
-        "fine",
-    )
-
-
 def test_compaction_keeps_rows_and_arrays(store: Store, cases: CaseTable) -> None:
     for i in range(10):
         write(
@@ -122,7 +121,7 @@ def test_compaction_keeps_rows_and_arrays(store: Store, cases: CaseTable) -> Non
     assert store.compact() == (20, 1)
     assert store.table().equals(before)
     assert len(store.parts("arrays")) == 1
-    assert pq.read_metadata(store.parts("arrays")[0]).num_rows == 10
+    assert rows_in(store.parts("arrays")[0]) == 10
     assert store.compact() == (1, 1)
 
 
@@ -165,7 +164,7 @@ def test_a_damaged_part_is_named(store: Store) -> None:
 
 
 @pytest.mark.parametrize(
-    "content", ['{"format": 0}', '{"format": 2, "kind": "trajopt sweep"}', "[]", "not json"]
+    "content", ['{"format": 0}', '{"format": 1, "kind": "trajopt sweep"}', "[]", "not json"]
 )
 def test_other_formats_are_refused(tmp_path: Path, content: str) -> None:
     place = tmp_path / "store"
@@ -175,48 +174,18 @@ def test_other_formats_are_refused(tmp_path: Path, content: str) -> None:
         open_store(place)
 
 
-OLD = Path(__file__).resolve().parents[1] / "data" / "sweep" / "format_1"
-
-
-def test_a_store_of_an_older_version_is_read_and_goes_on(tmp_path: Path) -> None:
-    """Written by the first version of this package that had sweeps (commit ff2b1b9), with x = 3 an
-    error."""
-    place = shutil.copytree(
-        OLD, tmp_path / "store", ignore=shutil.ignore_patterns("temporary", "jobs")
-    )
-    store = open_store(place, create=False)
-    frame = store.frame()
-    assert store.counts() == {"done": 5, "error": 1}
-    assert sorted(frame["x"]) == list(range(6))
-    good = frame[frame["status"] == "done"]
-    assert (good["square"] == good["x"] ** 2.0).all()
-    row, arrays = store.case(good["case"].iloc[0])
-    np.testing.assert_array_equal(arrays["track"], np.arange(6.0).reshape(3, 2) * row["x"])
-    again = sweep(
-        [{"x": i, "friction": 0.1 * i, "kind": "ab"[i % 2], "place": [0.5, i]} for i in range(6)],
-        noop,
-        executor=1,
-        store=place,
-    )
-    assert again.counts() == {
-        "done": 11,
-        "error": 1,
-    }  # another function: other cases, in one table with the old ones
-    again.compact()
-    assert len(again.frame()) == 12
-
-
-@pytest.mark.parametrize("version", [0, 2, "1"])
-def test_a_store_of_another_format_is_refused_and_left_alone(
-    tmp_path: Path, version: object
-) -> None:
-    place = shutil.copytree(OLD, tmp_path / "store")
-    (place / "store.json").write_text(json.dumps({"format": version, "kind": "trajopt sweep"}))
+@pytest.mark.parametrize(
+    "content",
+    ['{"format": 1, "kind": "trajopt sweep"}', seal({"format": 3, "kind": "trajopt sweep"})],
+)
+def test_a_store_of_another_format_is_refused_and_left_alone(tmp_path: Path, content: str) -> None:
+    place = sweep([{"x": 1}], noop, executor=1, store=tmp_path / "store").path
+    (place / "store.json").write_text(content)
     before = {p: p.read_bytes() for p in place.rglob("*") if p.is_file()}
     with pytest.raises(
-        StoreError, match="but this version reads and writes format 1; use the trajopt version"
+        StoreError, match="but this version reads and writes format 2; use the trajopt version"
     ):
-        sweep([{"x": 1}], noop, executor=1, store=place)
+        sweep([{"x": 2}], noop, executor=1, store=place)
     assert {p: p.read_bytes() for p in place.rglob("*") if p.is_file()} == before
 
 
@@ -271,7 +240,7 @@ def test_kinds_that_exclude_each_other_become_text(store: Store, cases: CaseTabl
     write(store, cases, [Row(1, DONE, {"y": "high", "v": True}, {})], "other")
     assert sorted(store.frame()["y"]) == ["0.5", "high"]
     before = store.table()
-    store.align()
+    align(store)
     assert store.table().equals(before)
     assert sorted(pd.read_parquet(store.path / "parts")["v"]) == ["[1.0, 2.0]", "true"]
 
@@ -285,10 +254,9 @@ def test_other_directories_are_refused(tmp_path: Path) -> None:
 
 
 def test_format_on_disk(store: Store) -> None:
-    assert json.loads((store.path / "store.json").read_text()) == {
-        "format": 1,
-        "kind": "trajopt sweep",
-    }
+    content = json.loads((store.path / "store.json").read_text())
+    assert content.pop("checksum") == "318090101a37efd9cee301c95cab1160"
+    assert content == {"format": 2, "kind": "trajopt sweep"}
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
@@ -307,3 +275,36 @@ def test_full_disk_leaves_the_store_whole(
     monkeypatch.undo()
     assert len(store.table()) == 1
     assert list((store.path / "temporary").iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("returned", "words"),
+    [
+        ({"a.b": 1, "a": {"b": 2}}, "'a.b'.*each name once"),
+        ({"x": 1}, "'x'.*no value of the case"),
+        ({"status": "fine"}, "'status'"),
+        ({"run_host": "fine"}, "'run_host'"),
+        ({"y": 2**60 + 1}, "2\\^53"),
+        ({"y": np.array([2**60 + 1])}, "2\\^53"),
+        ({"y": "\ud800"}, "UTF-8"),
+        ({"\ud800": 1}, "result key"),
+        ({"y": {"z": np.ones(2), "z.": 1}, "y.z": 3}, "'y.z'"),
+    ],
+)
+def test_results_that_clash_or_lose_are_told(returned: Any, words: str) -> None:
+    with pytest.raises(ArgumentError, match=words):
+        results_of(returned, {"x"})
+
+
+def test_results_of_mixed_kinds_keep_their_values(tmp_path: Path) -> None:
+    values = [1.5, "high", True, [1.0, 2.0], None]
+    store = sweep(
+        [{"x": i} for i in range(5)],
+        lambda case: {"y": values[case["x"]]},
+        executor=1,
+        store=tmp_path / "store",
+        code="1",
+    )
+    frame = store.frame().sort_values("x")
+    assert frame["y"].tolist()[:4] == ["1.5", "high", "true", "[1.0, 2.0]"]
+    assert store.counts() == {"done": 5}

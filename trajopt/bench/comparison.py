@@ -30,7 +30,7 @@ from trajopt.provenance import processor
 from trajopt.sweeps.cases import Case
 from trajopt.sweeps.drive import Progress
 from trajopt.sweeps.store import Store
-from trajopt.sweeps.sweeps import sweep
+from trajopt.sweeps.sweeps import Old, sweep
 
 TARGETS = tuple(
     10.0**-k for k in range(1, 10)
@@ -249,10 +249,11 @@ def run_bench(
     *,
     jobs: int = 1,
     retry_failed: bool = False,
+    old: Old | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Store:
-    """Run all cases that have no row in ``store`` yet (or only a failed one), ``jobs`` at a
-    time."""
+    """Run all cases that have no row in ``store`` yet (or only a failed one), ``jobs`` at a time;
+    ``old`` as in ``sweep``."""
     seconds = (("", plan.seconds), *sorted(plan.longer.items()))
     run = BenchRun(plan.evaluations, seconds, str(Path(plan.problem_root).resolve()), plan.plugins)
     about = {
@@ -268,6 +269,7 @@ def run_bench(
         time_limit=plan.time_limit,
         problem=about,
         retry_failed=retry_failed,
+        old=old,
         source=json.dumps(
             {"title": plan.title, "problems": plan.problems, "optimizers": plan.optimizers}
         ),

@@ -11,6 +11,7 @@ import numpy as np
 from trajopt.bench.pictures import PROFILE_SHARE, save_bench_pictures
 from trajopt.bench.profiles import holm
 from trajopt.bench.tables import GRADIENT_METHODS, NEAR, SOLVED, BenchTables, Share
+from trajopt.files import whole_file
 from trajopt.report.files import markdown
 from trajopt.sweeps.store import Store
 
@@ -45,7 +46,8 @@ def write_report(store: Store, out: Path) -> Path:
         text += ["", f"## {title}", "", *lines]
     _raw(tables, out)
     page = out / "index.md"
-    page.write_text("\n".join(text) + "\n", encoding="utf-8")
+    with whole_file(page) as part:
+        part.write_text("\n".join(text) + "\n", encoding="utf-8")
     return page
 
 
@@ -282,7 +284,7 @@ def _raw(tables: BenchTables, out: Path) -> None:
 
 
 def _write_csv(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
         writer.writerows(rows)

@@ -14,6 +14,7 @@ from matplotlib.ticker import NullFormatter
 from trajopt.arrays import Array
 from trajopt.bench.profiles import data_profile, ecdf, performance_profile
 from trajopt.bench.tables import BenchTables, Unit
+from trajopt.files import whole_file
 from trajopt.report.style import (
     BLACK,
     BLUE,
@@ -60,7 +61,8 @@ def save_bench_pictures(tables: BenchTables, out: Path) -> dict[str, str]:
         for name, draw in drawn.values():
             figure = draw(tables)
             for kind in ("svg", "png"):
-                figure.savefig(out / f"{name}.{kind}", format=kind)
+                with whole_file(out / f"{name}.{kind}") as part:
+                    figure.savefig(part, format=kind)
     return {title: f"{name}.png" for title, (name, _) in drawn.items()}
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
 from trajopt.objectives.base import Objective
 from trajopt.optimize.plugins import mapping_of_file
 from trajopt.sweeps.store import Store
@@ -189,5 +190,6 @@ def write_best_known(store: Store, file: str | Path) -> dict[str, dict[str, Any]
                 "found_by": f"{row['optimizer']}, seed {int(row['seed'])}, {where}",
                 "x": json.loads(row["x"]),
             }
-    place.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n", encoding="utf-8")
+    with whole_file(place) as part:
+        part.write_text(json.dumps(dict(sorted(known.items())), indent=1) + "\n", encoding="utf-8")
     return known

@@ -7,10 +7,11 @@ import importlib
 import sys
 
 import typer
-from rich.console import Console
 
 from trajopt.cli import bench, paths, robot, search, sweep
+from trajopt.cli.shared import leaving
 from trajopt.errors import TrajoptError
+from trajopt.report.words import PlainConsole
 
 app = typer.Typer(
     add_completion=False,
@@ -41,15 +42,11 @@ UNUSABLE = 2
 def main() -> None:
     """Entry point: errors of the package become one line on standard error."""
     try:
-        app()
-    except TrajoptError as error:
-        Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, highlight=False)
-        sys.exit(UNUSABLE)
-    except (
-        OSError
-    ) as error:  # a folder that cannot be made, a full disk: the message names the file
-        Console(stderr=True, soft_wrap=True).print(f"error: {error}", markup=False, highlight=False)
+        with leaving("interrupted"):
+            app()
+    # OSError: a folder that cannot be made, a full disk: the message names the file
+    except (TrajoptError, OSError) as error:
+        PlainConsole(stderr=True, soft_wrap=True).print(f"error: {error}")
         sys.exit(UNUSABLE)
     except KeyboardInterrupt:
-        Console(stderr=True).print("interrupted")
         sys.exit(130)

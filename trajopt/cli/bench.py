@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -16,10 +15,11 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from trajopt.cli.shared import console
+from trajopt.cli.sweep import KeepOld, Rerun, old_rows
+
 if TYPE_CHECKING:
     from trajopt.sweeps.drive import Progress as SweepProgress
-
-console = Console()
 
 RUN = "run"
 BEST_KNOWN = Path("trajopt") / "bench" / "best_known.json"  # in a checkout
@@ -60,6 +60,8 @@ def run(
     retry_failed: Annotated[
         bool, typer.Option(help="also run again what hung, raised or died")
     ] = False,
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
 ) -> None:
     """Run every search that has no row yet; started again after any interruption, it goes on."""
     from trajopt.bench.comparison import load_bench, run_bench
@@ -84,7 +86,8 @@ def run(
         def report(now: SweepProgress) -> None:
             bar.update(task, completed=now.finished, total=now.total)
 
-        found = run_bench(plan, place, jobs=jobs, retry_failed=retry_failed, progress=report)
+        options: dict[str, Any] = {"jobs": jobs, "retry_failed": retry_failed, "progress": report}
+        found = run_bench(plan, place, old=old_rows(rerun, keep_old), **options)
     console.print(", ".join(f"{count} {name}" for name, count in found.counts().items()))
 
 
@@ -102,7 +105,7 @@ def report(
     from trajopt.sweeps.store import open_store
 
     page = write_report(open_store(store, create=False), out or store / "report")
-    console.print(f"written to {page}", highlight=False, soft_wrap=True)
+    console.print(f"written to {page}", soft_wrap=True)
 
 
 @app.command("best")

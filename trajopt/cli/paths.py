@@ -12,6 +12,7 @@ from rich.table import Table
 
 from trajopt.cli.shared import Overrides, console, overrides
 from trajopt.errors import ArgumentError
+from trajopt.report.words import words
 
 if TYPE_CHECKING:
     from trajopt.timing.trajectory import Trajectory
@@ -32,9 +33,11 @@ def explain(
 
     trajectory = _timed(plan, set_, engine)
     console.print(
-        f"[bold]{plan}[/bold]: {trajectory.duration:.4f} s over {trajectory.path.length:.3f} m "
-        f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e})",
-        highlight=False,
+        words(
+            (str(plan), "bold"),
+            f": {trajectory.duration:.4f} s over {trajectory.path.length:.3f} m "
+            f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e})",
+        )
     )
     stretches = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("from s (m)", "to s (m)", "limit that binds"):
@@ -73,7 +76,7 @@ def export(
         _timed(plan, set_, "auto"), sample_time, rule="mean" if rule == "mean" else "held"
     )
     export_commands(orders, out)
-    console.print(f"wrote {len(orders.times)} commands to {out}", highlight=False, soft_wrap=True)
+    console.print(f"wrote {len(orders.times)} commands to {out}", soft_wrap=True)
 
 
 def compare(

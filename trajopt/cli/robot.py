@@ -11,6 +11,7 @@ from rich.table import Table
 
 from trajopt.cli.shared import FAULTY, Overrides, console, overrides
 from trajopt.errors import ArgumentError
+from trajopt.report.words import words
 
 if TYPE_CHECKING:
     from trajopt.robots import Robot
@@ -45,15 +46,13 @@ def robot(
     _describe(found)
     faults = False
     for finding in findings(found):
-        mark = "[red]fault:[/red] " if finding.fault else ""
-        console.print(f"{mark}{finding.about}: {finding.text}", highlight=False)
+        mark = ("fault: " if finding.fault else "", "red")
+        console.print(words(mark, f"{finding.about}: {finding.text}"))
         faults |= finding.fault
     if out is not None:
         from trajopt.report.robot_picture import save_robot_picture
 
-        console.print(
-            f"written to {save_robot_picture(found, out)}", highlight=False, soft_wrap=True
-        )
+        console.print(f"written to {save_robot_picture(found, out)}", soft_wrap=True)
     if faults:
         raise typer.Exit(FAULTY)
 
@@ -76,7 +75,7 @@ def _describe(robot: Robot) -> None:
     from trajopt.robots.mobility import mobility_of
 
     degrees, size = mobility_of(robot), robot.description
-    console.print(f"[bold]{robot.name}[/bold]: {size.about or 'no description'}", highlight=False)
+    console.print(words((robot.name, "bold"), f": {size.about or 'no description'}"))
     lines = [
         f"{size.body.mass:g} kg, wheels: {_wheels(robot)}; driven: "
         + (", ".join(robot.driven) or "none"),
@@ -84,7 +83,7 @@ def _describe(robot: Robot) -> None:
         f"{degrees.manoeuvrability}" + (" (skid steering)" if size.skid else ""),
     ]
     for line in lines:
-        console.print(line, highlight=False, soft_wrap=True)
+        console.print(line, soft_wrap=True)
 
 
 def _wheels(robot: Robot) -> str:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 
 from trajopt.cli.shared import (
     FAULTY,
@@ -20,6 +19,8 @@ from trajopt.cli.shared import (
     overrides,
 )
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
+from trajopt.report.words import words
 
 if TYPE_CHECKING:
     from trajopt.arrays import Array
@@ -68,7 +69,7 @@ def solve(
         _write(solution, out, seed, pictures)
     if not solution.holds:
         for fault in solution.faults:
-            console.print(f"[red]does not hold:[/red] {escape(fault)}")
+            console.print(words(("does not hold:", "red"), f" {fault}"))
         raise typer.Exit(FAULTY)
 
 
@@ -111,35 +112,42 @@ def validate(
 
         save_physics_picture(solution, report, folder)
         if report.recording.no_picture:
-            console.print(f"no engine.png: {report.recording.no_picture}", markup=False)
-    console.print(f"written to {folder}", highlight=False, soft_wrap=True)
+            console.print(f"no engine.png: {report.recording.no_picture}")
+    console.print(f"written to {folder}", soft_wrap=True)
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(help="problem or robot")] = "problem",
+    kind: Annotated[str, typer.Argument(help="problem, robot or sweep")] = "problem",
     out: Annotated[
         Path | None, typer.Option(help="file to write; standard output without it")
     ] = None,
 ) -> None:
-    """Print the JSON schema of problem or robot files, for editors."""
+    """Print the JSON schema of problem, robot or sweep files, for editors."""
     from trajopt.problem import problem_schema
     from trajopt.robots.description import RobotDescription
     from trajopt.schema import json_schema
+    from trajopt.sweeps.sweepfile import sweep_schema
 
-    if kind not in ("problem", "robot"):
-        raise ArgumentError("kind", kind, "problem or robot")
-    text = problem_schema() if kind == "problem" else json_schema(RobotDescription)
+    kinds = {
+        "problem": problem_schema,
+        "robot": lambda: json_schema(RobotDescription),
+        "sweep": sweep_schema,
+    }
+    if kind not in kinds:
+        raise ArgumentError("kind", kind, "one of " + ", ".join(kinds))
+    text = kinds[kind]()
     if out is None:
         sys.stdout.write(text)
     else:
-        out.write_text(text, encoding="utf-8")
+        with whole_file(out) as part:
+            part.write_text(text, encoding="utf-8")
 
 
 def _write(solution: Solution, out: Path, seed: int, pictures: bool) -> None:
     from trajopt.report.run_folder import write_solution
 
     write_solution(solution, out, seed=seed, command=" ".join(sys.argv), pictures=pictures)
-    console.print(f"written to {out}", highlight=False, soft_wrap=True)
+    console.print(f"written to {out}", soft_wrap=True)
 
 
 def _searched(folder: Path) -> Array:

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
+import threading
 import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError
+from trajopt.report.words import PlainConsole
 
-console = Console(width=None if sys.stdout.isatty() else 120)  # tables keep their shape when piped
+console = PlainConsole(
+    width=None if sys.stdout.isatty() else 120
+)  # tables keep their shape when piped
 
 FAULTY = 1
 # What can be switched on in a physics check; None drives the planned wheel speeds.
@@ -58,6 +65,37 @@ def overrides(items: list[str] | None) -> dict[str, Any]:
     return found
 
 
+@contextmanager
+def leaving(told: str) -> Iterator[None]:
+    """Ctrl-C or SIGTERM says ``told`` and raises KeyboardInterrupt; a second one ends this process
+    at once, whatever it waits for (processes that work for it notice, and end too)."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only there can signals be caught
+        return
+    left = False
+
+    def leave(number: int, _: object) -> None:
+        nonlocal left
+        cursor = b"\x1b[?25h" if sys.stderr.isatty() else b""  # a progress bar has hidden it
+        if left:
+            os.write(2, cursor)
+            os._exit(128 + number)
+        left = True
+        os.write(2, cursor + f"{told}\n".encode())
+        raise KeyboardInterrupt
+
+    numbers = [
+        n for n in (signal.SIGINT, signal.SIGTERM) if signal.getsignal(n) is not signal.SIG_IGN
+    ]
+    before = {number: signal.signal(number, leave) for number in numbers}
+    try:
+        yield
+    finally:
+        if not left:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
 def control_mode(name: str) -> Mode | None:
     """The controller called ``name`` on the command line. Raises ArgumentError for another name."""
     if name not in CONTROLS:
@@ -74,7 +112,7 @@ class Bar:
             BarColumn(),
             TextColumn("{task.fields[best]}"),
             TimeElapsedColumn(),
-            console=Console(stderr=True),
+            console=PlainConsole(stderr=True),
             transient=True,
             disable=not sys.stderr.isatty(),
         )

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
+from trajopt.cli.shared import console, leaving
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
+from trajopt.report.words import PlainConsole, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,14 +24,15 @@ if TYPE_CHECKING:
     from trajopt.sweeps.executors import Engine
     from trajopt.sweeps.store import Store
     from trajopt.sweeps.sweepfile import SweepPlan
+    from trajopt.sweeps.sweeps import Old
 
 app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="Run a study over many cases, on one machine or on a cluster, and lose nothing.",
 )
-console = Console()
-
+_KEPT = "interrupted: finished cases are kept, the same command goes on; once more: at once"
+_SUBMITTED = "interrupted: finished cases are kept; an array that was submitted goes on"
 _SHOWN = 5  # cases shown by --dry-run
 
 SweepFile = Annotated[Path, typer.Argument(help="sweep file (*.toml)", show_default=False)]
@@ -47,6 +49,8 @@ EngineName = Annotated[
         "--engine", help="processes, dask, dask-slurm, or tcp://host:port of a Dask scheduler"
     ),
 ]
+Rerun = Annotated[bool, typer.Option("--rerun", help="run cases again whose rows other code made")]
+KeepOld = Annotated[bool, typer.Option("--keep-old", help="keep rows that other code made")]
 Host = Annotated[str, typer.Option(help="address at which Dask's servers listen")]
 
 
@@ -57,6 +61,8 @@ def run(
     workers: Workers = 0,
     engine: EngineName = "processes",
     host: Host = "127.0.0.1",
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
     dry_run: Annotated[
         bool, typer.Option(help="show cases and an estimate of the time; store nothing")
     ] = False,
@@ -73,6 +79,7 @@ def run(
         store or _default_store(sweep_file),
         _engine(engine, workers, host),
         retry_failed=False,
+        old=old_rows(rerun, keep_old),
     )
 
 
@@ -83,6 +90,8 @@ def retry_failed(
     workers: Workers = 0,
     engine: EngineName = "processes",
     host: Host = "127.0.0.1",
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
 ) -> None:
     """Run cases again that failed, timed out or crashed, and those without a row."""
     from trajopt.sweeps.sweepfile import load_sweep
@@ -92,6 +101,7 @@ def retry_failed(
         store or _default_store(sweep_file),
         _engine(engine, workers, host),
         retry_failed=True,
+        old=old_rows(rerun, keep_old),
     )
 
 
@@ -107,6 +117,8 @@ def submit(
     partition: Annotated[str | None, typer.Option(help="Slurm partition")] = None,
     wait: Annotated[bool, typer.Option(help="wait until the array has ended")] = False,
     failed: Annotated[bool, typer.Option("--retry-failed", help="failed cases too")] = False,
+    rerun: Rerun = False,
+    keep_old: KeepOld = False,
 ) -> None:
     """Hand the missing cases to Slurm and return; nothing here needs to stay alive."""
     from trajopt.sweeps.host import CaseLimits
@@ -119,16 +131,19 @@ def submit(
         raise ArgumentError("--slurm", False, "--slurm: job arrays are submitted to Slurm only")
     plan = load_sweep(sweep_file)
     place = open_store(store or _default_store(sweep_file))
-    done = hand_over(
-        plan.table,
-        plan.run,
-        place,
-        limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
-        options=SlurmOptions(time_, memory, partition, at_once, elements),
-        source=plan.text,
-        retry_failed=failed,
-        wait=wait,
-    )
+    with leaving(_SUBMITTED):
+        done = hand_over(
+            plan.table,
+            plan.run,
+            place,
+            limits=CaseLimits(plan.time_limit, plan.memory_limit or 0),
+            options=SlurmOptions(time_, memory, partition, at_once, elements),
+            source=plan.text,
+            code=plan.code,
+            retry_failed=failed,
+            old=old_rows(rerun, keep_old),
+            wait=wait,
+        )
     if not done.job:
         console.print("nothing is missing")
     else:
@@ -184,7 +199,7 @@ def show(
         shown.add_row(name, f"array {array.shape}")
     console.print(shown)
     if row.get("error_traceback"):
-        console.print(row["error_traceback"], markup=False, highlight=False)
+        console.print(row["error_traceback"])
 
 
 def report(
@@ -215,7 +230,7 @@ def report(
             open_store(place, create=False), case, out or Path("out") / "report" / case, plan
         )
     for file in files:
-        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
+        console.print(f"wrote {file}", soft_wrap=True)
 
 
 @app.command()
@@ -228,6 +243,31 @@ def compact(store: StorePath) -> None:
 
 
 @app.command()
+def verify(store: StorePath) -> None:
+    """Read everything in a store and compare it with its checksums; exit code 1 for damage."""
+    from trajopt.sweeps.store import open_store
+    from trajopt.sweeps.upkeep import verify as verify_store
+
+    found = verify_store(open_store(store, create=False))
+    for damage in found:
+        console.print(str(damage))
+    if found:
+        raise typer.Exit(1)
+    console.print("whole")
+
+
+@app.command()
+def repair(store: StorePath) -> None:
+    """Take out what is damaged, with lists of the cases to run again, into <store>/damaged."""
+    from trajopt.sweeps.upkeep import repair as repair_store
+
+    found = repair_store(store)
+    for damage in found:
+        console.print(str(damage))
+    console.print("now run the sweep again: it fills the gaps" if found else "whole")
+
+
+@app.command()
 def export(
     store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]
 ) -> None:
@@ -235,18 +275,19 @@ def export(
     from trajopt.sweeps.store import open_store
 
     place = open_store(store, create=False)
-    match out.suffix:
-        case ".csv":
-            place.frame().to_csv(out, index=False)
-        case ".jsonl":
-            place.frame().to_json(out, orient="records", lines=True, date_format="iso")
-        case ".parquet":
-            import pyarrow.parquet as pq
+    if out.suffix not in (".csv", ".parquet", ".jsonl"):
+        raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
+    with whole_file(out) as part:
+        match out.suffix:
+            case ".csv":
+                place.frame().to_csv(part, index=False)
+            case ".jsonl":
+                place.frame().to_json(part, orient="records", lines=True, date_format="iso")
+            case ".parquet":
+                import pyarrow.parquet as pq
 
-            pq.write_table(place.table(), out)
-        case _:
-            raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
-    console.print(f"written to {out}", highlight=False, soft_wrap=True)
+                pq.write_table(place.table(), part)
+    console.print(f"written to {out}", soft_wrap=True)
 
 
 @app.command()
@@ -266,19 +307,41 @@ def plot(
     from trajopt.report.sweeps import draw
 
     draw(store, out, value=value, x=x, y=y, by=by, pair=pair)
-    console.print(f"written to {out}", highlight=False, soft_wrap=True)
+    console.print(f"written to {out}", soft_wrap=True)
 
 
-def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> None:
+def old_rows(rerun: bool, keep_old: bool) -> Old | None:
+    """What to do with cases whose rows other code made. Raises ArgumentError for both at once."""
+    if rerun and keep_old:
+        raise ArgumentError("--rerun", "--keep-old", "one of the two")
+    return "rerun" if rerun else "keep" if keep_old else None
+
+
+def _go(
+    plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool, old: Old | None
+) -> None:
+    from trajopt.sweeps.source import code_of
     from trajopt.sweeps.store import open_store
-    from trajopt.sweeps.sweeps import missing, sweep
+    from trajopt.sweeps.sweeps import OldCodeError, missing, sweep
 
-    place = open_store(store)
-    left = len(missing(plan.table, place, retry_failed=retry_failed))
+    place, code = open_store(store), code_of(plan.run, plan.code)
+    try:
+        left = len(missing(plan.table, place, code, retry_failed=retry_failed, old=old))
+    except OldCodeError as error:
+        if not sys.stdin.isatty():
+            raise
+        console.print(str(error))
+        answer = ""
+        while answer not in ("rerun", "keep", "stop"):
+            answer = typer.prompt("rerun, keep or stop")
+        if answer == "stop":
+            raise typer.Exit(2) from None
+        old = cast("Old", answer)
+        left = len(missing(plan.table, place, code, retry_failed=retry_failed, old=old))
     console.print(
         f"{plan.title}: {len(plan.table)} cases, {left} to run on {engine.name}; store {store}"
     )
-    with _ending_cleanly(), _bar(left) as report:
+    with leaving(_KEPT), _bar(left) as report:
         sweep(
             plan.table,
             plan.run,
@@ -286,7 +349,9 @@ def _go(plan: SweepPlan, store: Path, engine: Engine, *, retry_failed: bool) -> 
             store=place,
             time_limit=plan.time_limit,
             memory_limit=plan.memory_limit,
+            code=plan.code,
             retry_failed=retry_failed,
+            old=old,
             source=plan.text,
             progress=report,
         )
@@ -301,7 +366,6 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
 
     import numpy as np
 
-    from trajopt.sweeps.drive import sampled
     from trajopt.sweeps.executors import available_processors
     from trajopt.sweeps.sweeps import sweep
 
@@ -314,14 +378,15 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
             *(f"{v:.6g}" if isinstance(v, float) else str(v) for v in case.values.values()),
         )
     console.print(shown)
-    with tempfile.TemporaryDirectory() as folder, _ending_cleanly():
+    with tempfile.TemporaryDirectory() as folder, leaving("interrupted"):
         store = sweep(
-            sampled(plan.table),
+            plan.table.sampled(),
             plan.run,
             executor=1,
             store=Path(folder) / "trial",
             time_limit=plan.time_limit,
             memory_limit=plan.memory_limit,
+            code=plan.code,
         )
         frame = store.frame(["run_seconds", "error", "error_message"])
     seconds = float(frame["run_seconds"].median())
@@ -332,7 +397,10 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
     )
     for _, row in frame[frame["status"] != "done"].iterrows():
         console.print(
-            f"[red]{row['status']}[/red] {row['case'][:12]}: {row['error']}: {row['error_message']}"
+            words(
+                (row["status"], "red"),
+                f" {row['case'][:12]}: {row['error']}: {row['error_message']}",
+            )
         )
 
 
@@ -370,16 +438,6 @@ def _engine(name: str, workers: int, host: str) -> Engine:
 
 
 @contextmanager
-def _ending_cleanly() -> Iterator[None]:
-    """SIGTERM ends a sweep as Ctrl-C does: finished cases are kept."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-@contextmanager
 def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
     """Progress with rate and remaining time on a terminal; a line a minute where there is none."""
     from rich import progress as bars
@@ -390,7 +448,7 @@ def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
         bars.MofNCompleteColumn(),
         bars.TextColumn("{task.fields[rate]}"),
         bars.TimeElapsedColumn(),
-        console=Console(stderr=True),
+        console=PlainConsole(stderr=True),
         disable=not sys.stderr.isatty(),
     )
     task: Any = bar.add_task("", total=total, failed="", rate="")

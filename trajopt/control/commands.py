@@ -16,6 +16,7 @@ import numpy as np
 
 from trajopt.arrays import Array, fold, require_positive
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
 from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
@@ -122,7 +123,7 @@ def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
     """Write t (s) and a column v_<wheel> (m/s) a wheel as CSV for a robot; ends with a row of
     zeros."""
     path = FilePath(file)
-    with path.open("w", newline="", encoding="utf-8") as stream:
+    with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(["t", *(f"v_{name}" for name in orders.wheels)])
         for t, row in zip(orders.times, orders.speeds, strict=True):

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from trajopt.arrays import Array, IntArray
+from trajopt.kernels import kernel
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
 from trajopt.objectives.swarm import (
     LANES,
@@ -39,7 +39,7 @@ _R0, _R1, _R2, _R3 = (LANES * i for i in range(22, 26))
 _ROWS, _SUMS = 26, 15
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
+@kernel(fastmath=STRICT)
 def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba infers
     """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in place.
 
@@ -147,7 +147,7 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba i
             st[_SUM_Y + j] += s * gx + c * gy
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def _swarm(co, first, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]  # numba infers
     """Fill ``out`` (7, n) for candidates ``z`` (n, d): final x, y, yaw and the travel of four
     wheels.

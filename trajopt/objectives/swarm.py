@@ -17,6 +17,7 @@ import numba
 import numpy as np
 
 from trajopt.arrays import Array, IntArray
+from trajopt.kernels import kernel
 from trajopt.objectives.rollout import GAUSS_WEIGHTS, Kinematics, StepGrid
 from trajopt.robots.actuator import SMALL_SPAN, Actuator
 
@@ -61,7 +62,7 @@ def turned(c, s, a):  # type: ignore[no-untyped-def]  # numba infers
     return c * cos - s * sin, s * cos + c * sin
 
 
-@numba.njit(cache=True, error_model="numpy", fastmath=STRICT)
+@kernel(fastmath=STRICT)
 def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba infers
     """All steps of one block of candidates; ``st`` (_ROWS * LANES,) is read and changed in
     place."""
@@ -109,7 +110,7 @@ def _block(co, inverse, forward, st):  # type: ignore[no-untyped-def]  # numba i
             st[_SUM_Y + j] += s * mx + c * my
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type: ignore[no-untyped-def]  # numba infers
     """Fill ``out`` (7, n) for candidates ``z`` (n, d): final x, y, yaw and the travel of four
     wheels.
@@ -140,7 +141,7 @@ def _swarm(co, inverse, forward, z, places, fixed, limits, start, out):  # type:
                 out[r, first + j] = start[r] + st[(_SUMS + r) * LANES + j]
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def terminal_costs(end, pose, gains, wanted, wheel_gains, period, cost):  # type: ignore[no-untyped-def]  # numba infers
     """Table 4.4 of [guzman2015] from final states ``end`` (7, n)."""
     for i in range(end.shape[1]):

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
 from trajopt.optimize.base import FEASIBLE, best_index, better
 
 _COLLAPSED = 1e-15  # of the width: spread and velocity at which a swarm has come to rest
@@ -163,15 +164,13 @@ class Swarm:
             },
             default=_plain,
         )
-        part = target.with_name(target.name + ".part")
-        with part.open("wb") as file:
+        with whole_file(target) as part, part.open("wb") as file:
             np.savez(
                 file,
                 allow_pickle=False,
                 state=np.array(state),
                 **{name: getattr(self, name) for name in _ARRAYS},
             )
-        part.replace(target)
 
     @classmethod
     def load(cls, path: str | Path) -> Swarm:

@@ -6,13 +6,13 @@ exactly.
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from trajopt.kernels import kernel
 from trajopt.optimize.base import FEASIBLE
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[no-untyped-def]
     """Update own bests in place by Deb's rule; the index of the swarm's best."""
     n, d = x.shape
@@ -42,7 +42,7 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
     return best
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def ring_leaders(own_cost, own_violation, reach, leaders):  # type: ignore[no-untyped-def]
     """Fill ``leaders`` (n,): the index of the best own position within ``reach`` places on the
     ring."""
@@ -61,7 +61,7 @@ def ring_leaders(own_cost, own_violation, reach, leaders):  # type: ignore[no-un
         leaders[i] = best
 
 
-@numba.njit(cache=True, error_model="numpy")
+@kernel()
 def move(x, v, own, leaders, r, inertia, cognitive, social, low, high, limit):  # type: ignore[no-untyped-def]
     """Velocities and positions after one iteration, in place; how many coordinates lie outside.
 

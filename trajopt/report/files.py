@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
 
 
 def write_text(file: FilePath, text: str) -> None:
     """Write under a temporary name in the same folder, then rename."""
-    part = file.with_name(f".{file.name}.part")
-    part.write_text(text, encoding="utf-8", newline="\n")
-    os.replace(part, file)
+    with whole_file(file) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
 
 
 def write_json(file: FilePath, content: dict[str, Any]) -> None:

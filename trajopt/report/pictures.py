@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
+from trajopt.files import whole_file
 from trajopt.report.convergence_picture import convergence_figure
 from trajopt.report.files import made_folder
 from trajopt.report.path_picture import path_figure
@@ -52,8 +52,7 @@ def save_physics_picture(
     if report.recording.picture is not None:
         from matplotlib.image import imsave
 
-        part = place / ".engine.png.part"
-        imsave(part, report.recording.picture, format="png")
-        os.replace(part, place / "engine.png")
+        with whole_file(place / "engine.png") as part:
+            imsave(part, report.recording.picture, format="png")
         files.append(place / "engine.png")
     return tuple(files)

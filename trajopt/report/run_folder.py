@@ -10,7 +10,6 @@ path and trajectory to the last bit.
 from __future__ import annotations
 
 import csv
-import os
 import zlib
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.files import whole_file
 from trajopt.objectives.terminal import swarm_engine, terminal_objective
 from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
@@ -424,7 +424,5 @@ def _read_csv(file: FilePath, columns: tuple[str, ...]) -> dict[str, Array]:
 
 
 def _write_samples(samples: Array, file: FilePath) -> None:
-    part = file.with_name(f".{file.name}.part")
-    with part.open("wb") as stream:
-        np.savez_compressed(stream, samples=samples)
-    os.replace(part, file)
+    with whole_file(file) as part:
+        np.savez_compressed(part, samples=samples)

@@ -5,7 +5,6 @@ The colours are those of [okabe2008].
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path as FilePath
 from types import MappingProxyType
@@ -15,6 +14,8 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+
+from trajopt.files import whole_file
 
 BLACK, GREY, LIGHT = "#000000", "#6b6b6b", "#c9c9c9"
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
@@ -70,6 +71,7 @@ _RC: Any = {
     "legend.frameon": False,
     "legend.handlelength": 2.0,
     "savefig.facecolor": "white",
+    "text.parse_math": False,  # titles and names are the user's: a "$" in them is one
 }
 
 
@@ -88,9 +90,8 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 def save_figure(figure: Figure, file: FilePath) -> FilePath:
     """Write a PNG under a temporary name, then rename it. Returns ``file``."""
-    part = file.with_name(f".{file.name}.part")
-    figure.savefig(part, format="png", dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
-    os.replace(part, file)
+    with whole_file(file) as part:
+        figure.savefig(part, format="png", dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
     return file
 
 

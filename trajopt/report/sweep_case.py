@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from trajopt.arrays import Array
 from trajopt.case import ProblemRun, run_case, seed_of, solve_case
 from trajopt.errors import ArgumentError
+from trajopt.files import file_name, whole_file
 from trajopt.report.files import made_folder, write_json
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.run_folder import write_solution, write_validation
@@ -58,8 +59,9 @@ def report_case(
     files.append(place / "case.json")
     for name, array in arrays.items():
         table = array.reshape(len(array), -1) if array.ndim else array.reshape(1, 1)
-        files.append(place / f"{name}.csv")
-        np.savetxt(files[-1], table, delimiter=",", fmt="%.17g")
+        files.append(place / f"{file_name(name)}.csv")
+        with whole_file(files[-1]) as part:
+            np.savetxt(part, table, delimiter=",", fmt="%.17g")
     if arrays:
         with in_style():
             files.append(save_figure(arrays_figure(arrays), place / "arrays.png"))

@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
+from trajopt.files import whole_file
 from trajopt.report.intervals import wilson
 from trajopt.sweeps.store import open_store
 
@@ -152,7 +153,8 @@ def draw(
         raise ArgumentError(
             "options", None, "--x --y --value, --x --value [--by], or --pair twice or more"
         )
-    figure.savefig(out, dpi=DOTS)
+    with whole_file(out) as part:
+        figure.savefig(part, dpi=DOTS)
 
 
 def _done(frame: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:

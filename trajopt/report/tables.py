@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich import box
-from rich.markup import escape
 from rich.table import Table
 
 from trajopt.optimize.base import OptimizeResult
 from trajopt.report.run_folder import binding_shares
+from trajopt.report.words import words
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
 
@@ -31,14 +31,14 @@ def solution_table(solution: Solution) -> Table:
     )
     _margin_rows(table, solution)
     for name, facts in ({} if solution.details is None else solution.details.notes).items():
-        table.add_row(name.replace("_", " "), escape(_facts(facts)))
+        table.add_row(words(name.replace("_", " ")), words(_facts(facts)))
     if search is not None:
         failed = f", {search.failures} failed" if search.failures else ""
-        table.add_row("optimizer", escape(search.optimizer))
+        table.add_row("optimizer", words(search.optimizer))
         table.add_row("evaluations", f"{search.nfev}{failed}, {search.nit} iterations")
     table.add_row("time taken", f"{solution.wall_time:.2f} s")
-    verdict = "[green]holds[/green]" if solution.holds else "[red]does not hold[/red]"
-    table.add_row("status", f"{verdict}: {escape(solution.status)}")
+    verdict = ("holds", "green") if solution.holds else ("does not hold", "red")
+    table.add_row("status", words(verdict, f": {solution.status}"))
     return table
 
 
@@ -47,7 +47,7 @@ def _search_rows(table: Table, solution: Solution, search: OptimizeResult) -> No
     table.add_row("cost", f"{_number(solution.cost)}{unit}")
     if len(solution.terms) > 1:
         for name, value in solution.terms.items():
-            table.add_row(f"  {escape(name)}", _number(value))
+            table.add_row(words(f"  {name}"), _number(value))
     if not search.violation <= 0.0:
         table.add_row("violation", _number(search.violation))
     for i, point in enumerate(solution.control_points[1:-1], start=1):
@@ -78,19 +78,21 @@ def validation_table(report: ValidationReport, robot: Robot) -> Table:
         "off the path", f"rms {1e3 * report.path_rms:.2f} mm, most {1e3 * report.path_max:.2f} mm"
     )
     for name, value in zip(robot.wheel_names, report.wheel_deviation, strict=True):
-        table.add_row(f"wheel {name}", f"{1e3 * value:+.3f} mrad")
+        table.add_row(words(f"wheel {name}"), f"{1e3 * value:+.3f} mrad")
     worst = int(report.slip.argmax())
-    table.add_row("most slip", f"{report.slip[worst]:.3f} m/s, wheel {report.wheels[worst]}")
+    table.add_row("most slip", words(f"{report.slip[worst]:.3f} m/s, wheel {report.wheels[worst]}"))
     for hit in report.contacts:
         x, y = hit.place
-        table.add_row("contact", f"{hit.name} after {hit.time:.2f} s at ({x:.3f}, {y:.3f}) m")
+        table.add_row(
+            "contact", words(f"{hit.name} after {hit.time:.2f} s at ({x:.3f}, {y:.3f}) m")
+        )
     table.add_row("real-time factor", f"{report.real_time_factor:.2f}")
     return table
 
 
 def _table(title: str) -> Table:
     table = Table(
-        title=escape(title),
+        title=words(title),
         title_justify="left",
         title_style="bold",
         box=box.SIMPLE_HEAD,
@@ -105,17 +107,17 @@ def _table(title: str) -> Table:
 def _margin_rows(table: Table, solution: Solution) -> None:
     if solution.trajectory is None:
         if solution.infeasible is not None:
-            table.add_row("limits", f"[red]{escape(str(solution.infeasible))}[/red]")
+            table.add_row("limits", words((str(solution.infeasible), "red")))
         return
     shares = binding_shares(solution.trajectory)
     for name, margin in sorted(solution.margins.items(), key=lambda item: item[1]):
         binds = f", binds {shares[name]:.0%} of the time" if name in shares else ""
         text = (
-            f"{max(margin, 0.0):.1%}{binds}"
+            words(f"{max(margin, 0.0):.1%}{binds}")
             if margin > -1e-9
-            else f"[red]broken by {-margin:.1%}[/red]"
+            else words((f"broken by {-margin:.1%}", "red"))
         )
-        table.add_row(f"margin {escape(name)}", text)
+        table.add_row(words(f"margin {name}"), text)
 
 
 def _number(value: float) -> str:

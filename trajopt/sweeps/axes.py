@@ -11,40 +11,134 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from pydantic import Field, JsonValue, model_validator
 
 from trajopt.arrays import AnyArray, Array
 from trajopt.errors import ArgumentError
+from trajopt.schema import Section, broken_rule
 from trajopt.sweeps.cases import as_column
 from trajopt.sweeps.expressions import evaluate, parse
 
-MOST_CASES = 100_000_000  # beyond that the table itself does not fit a machine; chosen
+MOST_CASES = 10_000_000  # beyond that the table itself takes gigabytes and minutes; chosen
 
-_KINDS = ("values", "range", "log", "random")
-_METHODS = ("random", "latin-hypercube", "sobol")
+Count = Annotated[int, Field(ge=1, le=MOST_CASES)]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Values = Annotated[tuple[JsonValue, ...], Field(min_length=1, max_length=MOST_CASES)]
+Pair = tuple[float, float]
 
 
-def combined(
-    axes: Mapping[str, Mapping[str, Any]], sample: Mapping[str, Any] | None = None
-) -> dict[str, AnyArray]:
+class Draw(Section):
+    """A distribution, one of these: uniform = [low, high], log-uniform = [low, high], normal =
+    [mean, deviation], choice = [...]."""
+
+    uniform: Pair | None = None
+    log_uniform: Pair | None = Field(None, alias="log-uniform")
+    normal: Pair | None = None
+    choice: Values | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.uniform, self.log_uniform, self.normal, self.choice).count(None) != 3:
+            raise broken_rule("", _given(self), "one of uniform, log-uniform, normal, choice")
+        low, high = self.uniform or self.log_uniform or (0.0, 1.0)
+        if not low < high or (self.log_uniform and not low > 0):
+            raise broken_rule("", _given(self), "low < high, and low > 0 where it is logarithmic")
+        if self.normal and not self.normal[1] > 0:
+            raise broken_rule("normal", self.normal, "[mean, deviation] with a deviation > 0")
+        return self
+
+    def quantile(self, name: str, shares: Array) -> AnyArray:
+        """Column of the values below which the given shares (n,) lie."""
+        if self.choice:
+            options = as_column(name, self.choice)
+            return options[np.minimum((shares * len(options)).astype(np.int64), len(options) - 1)]
+        if self.normal:
+            from scipy.special import ndtri
+
+            inner = np.clip(shares, 1e-12, 1 - 1e-12)
+            return as_column(name, self.normal[0] + self.normal[1] * ndtri(inner))
+        low, high = np.log(self.log_uniform) if self.log_uniform else self.uniform or (0.0, 1.0)
+        with np.errstate(all="ignore"):  # what is beyond all numbers, the column refuses
+            evenly = low + (high - low) * shares
+            return as_column(name, np.exp(evenly) if self.log_uniform else evenly)
+
+
+class Random(Draw):
+    """Independent draws of one axis; the stream depends on ``seed`` and the axis' name."""
+
+    count: Count
+    seed: Seed
+
+
+class Axis(Section):
+    """Values of one name: one of ``values``, ``range``, ``log``, ``random``."""
+
+    values: Values | None = None
+    range: tuple[float, float, Count] | None = None
+    log: tuple[float, float, Count] | None = None
+    random: Random | None = None
+    zip: str | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.values, self.range, self.log, self.random).count(None) != 3:
+            raise broken_rule("", _given(self), "one of values, range, log, random")
+        if self.log and not min(self.log[:2]) > 0:
+            raise broken_rule("log", self.log, "[from, to, count] with from and to > 0")
+        return self
+
+    def column(self, name: str) -> AnyArray:
+        """Values (n,), for a table under ``name``. Raises ArgumentError for what no table holds."""
+        if self.values:
+            return as_column(f"axes.{name}", self.values)
+        if self.random:
+            digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
+            rng = np.random.default_rng([self.random.seed, int.from_bytes(digest, "little")])
+            return self.random.quantile(f"axes.{name}", rng.random(self.random.count))
+        with np.errstate(all="ignore"):
+            evenly = (
+                np.geomspace(*self.log) if self.log else np.linspace(*(self.range or (0, 0, 1)))
+            )
+        return as_column(f"axes.{name}", evenly)
+
+
+class Sample(Section):
+    """Joint draws over several names."""
+
+    method: Literal["random", "latin-hypercube", "sobol"]
+    count: Count
+    seed: Seed
+    axes: Annotated[dict[str, Draw], Field(min_length=1, max_length=1000)]
+
+    def columns(self) -> dict[str, AnyArray]:
+        """Values (n,) by name. Raises ArgumentError."""
+        if self.count * len(self.axes) > MOST_CASES:
+            raise ArgumentError("sample.count", self.count, f"at most {MOST_CASES} values in all")
+        draws = _unit_draws(self.method, self.count, len(self.axes), self.seed)
+        return {
+            name: draw.quantile(f"sample.axes.{name}", draws[:, i])
+            for i, (name, draw) in enumerate(self.axes.items())
+        }
+
+
+def combined(axes: Mapping[str, Axis], sample: Sample | None = None) -> dict[str, AnyArray]:
     """Columns of all combinations; the last axis varies fastest. Raises ArgumentError for a wrong
     axis."""
     groups: dict[str, dict[str, AnyArray]] = {}
     for name, axis in axes.items():
-        group = axis.get("zip")
-        groups.setdefault(f"zip {group}" if group is not None else f"axis {name}", {})[name] = (
-            axis_values(name, axis)
-        )
+        key = f"axes.{name}" if axis.zip is None else f"zip {axis.zip}"
+        groups.setdefault(key, {})[name] = axis.column(name)
     for key, columns in groups.items():
         if len({len(c) for c in columns.values()}) > 1:
             raise ArgumentError(
                 key, {n: len(c) for n, c in columns.items()}, "zipped axes of equal length"
             )
     if sample:
-        groups["sample"] = _joint(sample)
+        groups["sample"] = sample.columns()
     sizes = [len(next(iter(columns.values()))) for columns in groups.values()]
     total = math.prod(sizes) if sizes else 0
     if total > MOST_CASES:
@@ -61,51 +155,18 @@ def combined(
     return result
 
 
-def axis_values(name: str, axis: Mapping[str, Any]) -> AnyArray:
-    """Values (n,) of one axis."""
-    where = f"axes.{name}"
-    given = [kind for kind in _KINDS if kind in axis]
-    unknown = set(axis) - {*_KINDS, "zip"}
-    if unknown or len(given) != 1:
-        raise ArgumentError(
-            where, dict(axis), "one of values, range, log, random (and zip, where wanted)"
-        )
-    if given[0] == "random":
-        return _independent(name, axis["random"])
-    values = axis[given[0]]
-    if given[0] == "values":
-        if not isinstance(values, Sequence) or isinstance(values, str) or not values:
-            raise ArgumentError(where, values, "a list with at least one value")
-        return as_column(where, values)
-    if (
-        not isinstance(values, Sequence)
-        or len(values) != 3
-        or isinstance(values[2], bool)
-        or not isinstance(values[2], int)
-        or values[2] < 1
-    ):
-        raise ArgumentError(where, values, "[from, to, count] with a whole count >= 1")
-    low, high, count = values
-    if given[0] == "range":
-        evenly: AnyArray = np.linspace(low, high, count)
-        return as_column(where, evenly)
-    if not (low > 0 and high > 0):
-        raise ArgumentError(where, values, "[from, to, count] with from and to > 0")
-    return as_column(where, np.geomspace(low, high, count))
-
-
 def with_derived(
     columns: dict[str, AnyArray], derived: Mapping[str, str], exclude: Sequence[str]
 ) -> dict[str, AnyArray]:
     """Columns with derived values (an expression a name) added and excluded cases (an expression
-    each) removed."""
-    if not derived and not exclude:
-        return columns
-    formulas = {name: parse(str(text)) for name, text in derived.items()}
-    rules = [parse(text) for text in exclude]
-    clash = set(formulas) & set(columns)
-    if clash:
+    each) removed. Raises ArgumentError, also for a name that another one starts with."""
+    formulas = {name: parse(f"derived.{name}", text) for name, text in derived.items()}
+    rules = [parse(f"exclude[{i}]", text) for i, text in enumerate(exclude)]
+    if clash := set(formulas) & set(columns):
         raise ArgumentError("derived", sorted(clash), "names that are not axes")
+    _check_names([*columns, *formulas])
+    if not formulas and not rules:
+        return columns
     names, lists = list(columns), [c.tolist() for c in columns.values()]
     made: dict[str, list[Any]] = {name: [] for name in formulas}
     kept = []
@@ -121,37 +182,19 @@ def with_derived(
     places = np.array(kept, dtype=np.int64)
     return {
         **{n: c[places] for n, c in columns.items()},
-        **{n: as_column(n, v) for n, v in made.items()},
+        **{n: as_column(f"derived.{n}", v) for n, v in made.items()},
     }
 
 
-def _independent(name: str, spec: Mapping[str, Any]) -> AnyArray:
-    """Random draws of one axis; the stream depends on the seed and the axis' name."""
-    seed, count = spec.get("seed"), spec.get("count")
-    if not _whole(seed, 0) or not _whole(count, 1):
-        raise ArgumentError(
-            f"axes.{name}.random", dict(spec), "a whole seed >= 0 and a whole count >= 1"
-        )
-    digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
-    rng = np.random.default_rng([int(seed), int.from_bytes(digest, "little")])  # type: ignore[arg-type]
-    draws: AnyArray = rng.random((int(count),))  # type: ignore[arg-type]
-    shape = {k: v for k, v in spec.items() if k not in ("seed", "count")}
-    return as_column(name, _quantile(f"axes.{name}.random", shape)(draws))
-
-
-def _joint(sample: Mapping[str, Any]) -> dict[str, AnyArray]:
-    unknown = set(sample) - {"method", "count", "seed", "axes"}
-    method, count, seed, axes = (sample.get(k) for k in ("method", "count", "seed", "axes"))
-    if unknown or method not in _METHODS or not _whole(count, 1) or not _whole(seed, 0) or not axes:
-        raise ArgumentError(
-            "sample", dict(sample), f"method ({', '.join(_METHODS)}), count, seed and axes"
-        )
-    assert isinstance(axes, Mapping)
-    draws = _unit_draws(str(method), int(count), len(axes), int(seed))  # type: ignore[arg-type]
-    return {
-        name: as_column(name, _quantile(f"sample.axes.{name}", spec)(draws[:, i]))
-        for i, (name, spec) in enumerate(axes.items())
-    }
+def _check_names(names: Sequence[str]) -> None:
+    """Names must be told apart: ``a.b`` and the key b of a table ``a`` are the same key."""
+    for name in names:
+        if not name or not name.isprintable() or len(name) > 200:
+            raise ArgumentError("axes", name, "a name of 1 to 200 printable characters")
+        parts = name.split(".")
+        for end in range(1, len(parts)):
+            if (start := ".".join(parts[:end])) in names:
+                raise ArgumentError(f"axes.{start}", name, "no name that another one starts with")
 
 
 def _unit_draws(method: str, count: int, dimension: int, seed: int) -> Array:
@@ -176,32 +219,5 @@ def _unit_draws(method: str, count: int, dimension: int, seed: int) -> Array:
     return unit
 
 
-def _quantile(where: str, spec: Mapping[str, Any]) -> Callable[[AnyArray], AnyArray]:
-    """Inverse distribution: uniform = [low, high], log-uniform, normal = [mean, deviation], choice
-    = [...]."""
-    if len(spec) != 1:
-        raise ArgumentError(where, dict(spec), "one of uniform, log-uniform, normal, choice")
-    ((kind, values),) = spec.items()
-    if kind == "choice" and isinstance(values, list) and values:
-        options = as_column(where, values)
-        return lambda u: options[np.minimum((u * len(options)).astype(np.int64), len(options) - 1)]
-    if not isinstance(values, list) or len(values) != 2:
-        raise ArgumentError(where, dict(spec), "two numbers: [low, high] or [mean, deviation]")
-    a, b = float(values[0]), float(values[1])
-    if kind == "uniform" and a < b:
-        return lambda u: a + (b - a) * u
-    if kind == "log-uniform" and 0 < a < b:
-        return lambda u: np.exp(np.log(a) + (np.log(b) - np.log(a)) * u)
-    if kind == "normal" and b > 0:
-        from scipy.special import ndtri
-
-        return lambda u: a + b * ndtri(np.clip(u, 1e-12, 1 - 1e-12))
-    raise ArgumentError(
-        where,
-        dict(spec),
-        "uniform or log-uniform with low < high, normal with deviation > 0, or choice with a list",
-    )
-
-
-def _whole(value: Any, least: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= least
+def _given(section: Section) -> dict[str, Any]:
+    return section.model_dump(exclude_none=True, by_alias=True)

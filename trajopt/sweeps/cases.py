@@ -1,8 +1,10 @@
 """Cases of a sweep: their values, their identity and their seeds.
 
 A case is a mapping of names to plain values. Its identity is a hash of that content together with
-what it is run on (problem, run function, code version); its seed comes from the identity. So
-nothing depends on the order of cases, on how they are chunked, or on how many workers there are.
+what it is run on (problem, name of the run function); its seed comes from the identity. So nothing
+depends on the order of cases, on how they are chunked, or on how many workers there are. A row also
+has the checksum of the code that made it (``source.py``): only rows of a case's present code count
+as its own, while its seed stays when the code changes.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from numpy.typing import NDArray
 from trajopt.arrays import AnyArray, IntArray
 from trajopt.errors import ArgumentError
 
+SAMPLED = 3  # cases run first, to learn their time and columns
 ID_BYTES = 16  # 128 bit: two of 1e9 cases collide with probability 1e-21
 _BLOCK = 20_000  # cases hashed at a time, to bound memory; chosen
 _INT64 = 2**63
@@ -67,6 +70,15 @@ class CaseTable:
             {name: column[positions] for name, column in self.columns.items()}, self.ids[positions]
         )
 
+    @property
+    def name(self) -> str:
+        """Name of a chunk of these cases: a hash of their identities."""
+        return hashlib.blake2b(self.ids.tobytes(), digest_size=8).hexdigest()
+
+    def sampled(self) -> CaseTable:
+        """First, middle and last case, for estimates."""
+        return self.take(spread(len(self)))
+
     def rows(self) -> list[Case]:
         """All cases, one object each."""
         names = list(self.columns)
@@ -76,6 +88,11 @@ class CaseTable:
             Case(key.decode(), dict(zip(names, row, strict=True)))
             for key, row in zip(self.ids.tolist(), values, strict=True)
         ]
+
+
+def spread(count: int) -> IntArray:
+    """SAMPLED positions or fewer, from the first to the last of ``count``."""
+    return np.unique(np.linspace(0, count - 1, min(SAMPLED, count)).round().astype(np.int64))
 
 
 def case_table(
@@ -102,12 +119,9 @@ def case_table(
     return table if len(first) == len(ids) else table.take(np.sort(first))
 
 
-def identity_base(run: str, problem: Any, code: str) -> bytes:
-    """What all identities of a sweep share: name of the run function, content of the problem, code
-    version."""
-    text = json.dumps(
-        [run, canonical("problem", problem), code], sort_keys=True, separators=(",", ":")
-    )
+def identity_base(run: str, problem: Any) -> bytes:
+    """What all identities of a sweep share: name of the run function, content of the problem."""
+    text = json.dumps([run, canonical("problem", problem)], sort_keys=True, separators=(",", ":"))
     return hashlib.blake2b(text.encode(), digest_size=ID_BYTES).digest()
 
 
@@ -119,8 +133,13 @@ def canonical(name: str, value: Any) -> Any:
     """
     if isinstance(value, np.generic):
         value = value.item()
-    if value is None or isinstance(value, (bool, str)):
+    if value is None or isinstance(value, bool):
         return value
+    if isinstance(value, str):
+        try:
+            return value if value.isascii() or value.encode() else ""
+        except UnicodeEncodeError:
+            raise ArgumentError(name, value, "a text that UTF-8 can hold") from None
     if isinstance(value, int):
         if not -_INT64 <= value < _INT64:
             raise ArgumentError(name, value, "a whole number of at most 64 bits")

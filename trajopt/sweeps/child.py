@@ -103,7 +103,7 @@ def noted_progress(progress: mmap.mmap) -> tuple[int, float]:
 def _row(run: RunFunction, index: int, case: Case) -> Row:
     started, clock = time.time(), time.perf_counter()
     try:
-        results, arrays = results_of(run(case))
+        results, arrays = results_of(run(case), case.values)
     except BaseException as error:  # a case's SystemExit and KeyboardInterrupt are its errors
         seconds = time.perf_counter() - clock
         name = type(error).__name__

@@ -7,13 +7,12 @@ halves that die are halved again, until the one case whose worker always dies is
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ import numpy as np
 
 from trajopt.arrays import IntArray
 from trajopt.errors import TrajoptError
-from trajopt.sweeps.cases import CaseTable
+from trajopt.sweeps.cases import SAMPLED, CaseTable, spread
 from trajopt.sweeps.executors import Engine, end, is_death, started
 from trajopt.sweeps.host import (
     RETRIES,
@@ -31,12 +30,11 @@ from trajopt.sweeps.host import (
     run_chunk,
     stop_mark,
 )
-from trajopt.sweeps.rows import CRASHED, Kind, failed_row, row_table
+from trajopt.sweeps.rows import CRASHED, Kind, Origin, failed_row, row_table
 from trajopt.sweeps.runfunction import Packed
 from trajopt.sweeps.store import Store
 from trajopt.sweeps.supervisor import warm_up
 
-SAMPLED = 3  # cases run first, to learn their time and columns
 # s of work; chosen: a part costs some 10 ms, a crash costs a chunk
 SHORTEST_CHUNK, LONGEST_CHUNK = 0.25, 5.0
 _SHARE = 4  # a chunk is a quarter of what is left for its worker: large first; chosen
@@ -55,6 +53,21 @@ class Setup:
     run: Packed
     limits: CaseLimits
     parameter_kinds: Mapping[str, Kind]
+    code: str
+
+    def job(self, cases: CaseTable, kinds: Mapping[str, Kind], store: str) -> ChunkJob:
+        """A chunk of cases for a worker that sees the store at ``store``."""
+        return ChunkJob(
+            store,
+            cases.name,
+            cases,
+            self.run,
+            self.limits,
+            kinds,
+            self.parameter_kinds,
+            self.run_id,
+            self.code,
+        )
 
 
 @dataclass(frozen=True)
@@ -132,7 +145,7 @@ class Drive:
 
     def _sample_first(self) -> None:
         """Bring a first, a middle and a last case to the front."""
-        front = _spread(len(self.places))
+        front = spread(len(self.places))
         self.places = np.concatenate([self.places[front], np.delete(self.places, front)])
 
     def _waiting(self) -> bool:
@@ -173,17 +186,10 @@ class Drive:
                 raise
 
     def _job(self, chunk: _Chunk) -> ChunkJob:
-        cases, setup = self.table.take(chunk.places), self.setup
-        return ChunkJob(
-            str(setup.store.path),
-            chunk_name(cases),
-            cases,
-            setup.run,
-            setup.limits,
-            dict(self.kinds),
-            setup.parameter_kinds,
-            str(stop_mark(setup.store.path, setup.run_id)),
-        )
+        setup = self.setup
+        mark = stop_mark(setup.store.path, setup.run_id)
+        job = setup.job(self.table.take(chunk.places), dict(self.kinds), str(setup.store.path))
+        return replace(job, stop_mark=str(mark))
 
     # -- outcomes
 
@@ -209,7 +215,8 @@ class Drive:
     def _learn(self, outcome: ChunkReport, chunk: _Chunk) -> None:
         self.counts.update(outcome.counts)
         for name, kind in outcome.kinds.items():
-            self.kinds.setdefault(name, kind)
+            if self.kinds.setdefault(name, kind) != kind:
+                self.kinds[name] = "text"
         finished = sum(outcome.counts.values())
         if outcome.unfinished and not self.stopping:  # stopped from outside: the rest runs again
             self.next_missing(chunk)
@@ -222,7 +229,7 @@ class Drive:
 
     def next_missing(self, chunk: _Chunk) -> None:
         """Queue those cases of a chunk that have no row yet."""
-        known = self.setup.store.finished()
+        known = self.setup.store.finished(where=("run_id", self.setup.run_id))
         left = chunk.places[~np.isin(self.table.ids[chunk.places], known)]
         if len(left):
             self.retried.append(_Chunk(left))
@@ -250,8 +257,9 @@ class Drive:
         cases = self.table.take(chunk.places)
         told = f"its worker died {chunk.deaths} times while running this case"
         row = failed_row(0, CRASHED, "WorkerDied", told, "", 0.0)._replace(attempts=chunk.deaths)
-        table = row_table([row], cases, self.setup.parameter_kinds, self.kinds, "submitter")
-        self.setup.store.write_part("parts", chunk_name(cases), table)
+        origin = Origin(self.setup.run_id, self.setup.code, "submitter")
+        table = row_table([row], cases, self.setup.parameter_kinds, self.kinds, origin)
+        self.setup.store.write_part("parts", cases.name, table)
         self.counts[CRASHED] += 1
         if self.seconds_a_case is None:
             self.seconds_a_case = SHORTEST_CHUNK
@@ -294,18 +302,3 @@ class Drive:
             for future in done:
                 with contextlib.suppress(Exception):
                     self._learn(future.result(timeout=0), flights[future])
-
-
-def chunk_name(cases: CaseTable) -> str:
-    """Name of a chunk: a hash of its cases' identities."""
-    return hashlib.blake2b(cases.ids.tobytes(), digest_size=8).hexdigest()
-
-
-def sampled(table: CaseTable) -> CaseTable:
-    """First, middle and last case of a table, for estimates."""
-    return table.take(_spread(len(table)))
-
-
-def _spread(count: int) -> IntArray:
-    """SAMPLED positions or fewer, from the first to the last of ``count``."""
-    return np.unique(np.linspace(0, count - 1, min(SAMPLED, count)).round().astype(np.int64))

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ProcessPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from typing import Any
 
 from trajopt.errors import ArgumentError, MissingDependencyError, TrajoptError
@@ -217,14 +217,16 @@ def started(
     for _ in range(engine.starts):
         context = engine.start()
         try:
-            executor = context.__enter__()
+            with _uninterrupted():
+                executor = context.__enter__()
         except TrajoptError:
             raise
         except (Exception, CancelledError) as error:  # a cluster that lost processes meanwhile
             fault = error
             continue
         try:
-            tasks = [executor.submit(task, *arguments) for _ in range(engine.workers)]
+            with _uninterrupted():
+                tasks = [executor.submit(task, *arguments) for _ in range(engine.workers)]
             done, _ = wait(tasks, return_when=FIRST_COMPLETED)
             for first in done:
                 first.result()
@@ -238,6 +240,18 @@ def started(
         "case; finished cases are kept; a script that runs a sweep needs "
         '`if __name__ == "__main__":` around what it does'
     ) from fault
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Hold Ctrl-C back: processes and threads that start meanwhile, and all of theirs, never see
+    it, so that it is this process alone that leaves, and tells it."""
+    resource_tracker.ensure_running()  # its start would let Ctrl-C through again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def end(context: AbstractContextManager[Executor]) -> None:

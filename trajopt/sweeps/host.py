@@ -19,9 +19,9 @@ from trajopt.sweeps.rows import (
     CRASHED,
     TIMEOUT,
     Kind,
+    Origin,
     Row,
     array_table,
-    fitted,
     parameter_kind,
     result_kinds,
     row_table,
@@ -45,8 +45,8 @@ class CaseLimits:
 
 @dataclass(frozen=True)
 class ChunkJob:
-    """A chunk of cases for a worker: everything it needs to know. ``stop_mark``: file whose
-    presence says stop."""
+    """A chunk of cases for a worker: everything it needs to know. ``code``: checksum of what runs
+    them; ``stop_mark``: file whose presence says stop."""
 
     store: str
     name: str
@@ -55,6 +55,8 @@ class ChunkJob:
     limits: CaseLimits
     kinds: Mapping[str, Kind]
     parameter_kinds: Mapping[str, Kind]
+    run_id: str
+    code: str
     stop_mark: str | None = None
 
 
@@ -80,13 +82,14 @@ def run_chunk(job: ChunkJob, should_stop: Callable[[], bool] | None = None) -> C
     clock = time.perf_counter()
     rows = _rows_of(job, should_stop or _StopMark(job.stop_mark))
     kinds = result_kinds(rows, job.kinds)
-    rows = fitted(sorted(rows), kinds) if rows else []
     if rows:
+        rows.sort()
         store = open_store(job.store, create=False)
         beside = array_table(rows, job.cases)
         if beside is not None:  # first, so that no row ever lacks its arrays
             store.write_part("arrays", job.name, beside)
-        table = row_table(rows, job.cases, job.parameter_kinds, kinds, socket.gethostname())
+        origin = Origin(job.run_id, job.code, socket.gethostname())
+        table = row_table(rows, job.cases, job.parameter_kinds, kinds, origin)
         store.write_part("parts", job.name, table)
     times = sorted(r.seconds for r in rows)
     return ChunkReport(

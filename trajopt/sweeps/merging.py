@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from trajopt.arrays import BoolArray
 from trajopt.sweeps.rows import DONE, arrow
 
 
@@ -59,26 +60,30 @@ def conformed(table: Any, schema: Any) -> Any:
 
 
 def one_row_a_case(table: Any) -> Any:
-    """Sorted by case; of several rows of a case the finished one, else the latest."""
+    """Sorted by case; of several rows of a case one of the code that ran last: the finished one,
+    else the latest."""
     if len(table) == 0:
         return table
     compute = arrow().compute
-    keys = arrow().table(
-        {"case": table["case"], "failed": compute.not_equal(table["status"], DONE)}
-    )
-    order = [("case", "ascending"), ("failed", "ascending")]
-    if "run_started" in table.column_names:
-        keys = keys.append_column("started", table["run_started"])
-        order.append(("started", "descending"))
-    places = compute.sort_indices(keys, sort_keys=order)
-    cases = keys["case"].take(places).combine_chunks()
-    first = np.ones(len(cases), dtype=bool)
-    first[1:] = compute.not_equal(cases[1:], cases[:-1]).to_numpy(zero_copy_only=False)
+    if len(compute.unique(table["case_code"])) > 1:
+        places, first = _first_of_cases(table, [])
+        codes = table["case_code"].take(places).dictionary_encode().combine_chunks()
+        numbers = codes.indices.to_numpy(zero_copy_only=False)
+        last = numbers[first][np.cumsum(first) - 1]
+        table = table.take(places.filter(arrow().array(numbers == last)))
+    failed = compute.not_equal(table["status"], DONE)
+    places, first = _first_of_cases(table, [("failed", failed)])
     return table.take(places.filter(arrow().array(first)))
 
 
-def one_array_a_name(table: Any) -> Any:
-    """Sorted by case and name; of several arrays of a name the last."""
-    frame = table.select(["case", "name"]).to_pandas()
-    kept = np.flatnonzero(~frame.duplicated(keep="last").to_numpy())
-    return table.take(arrow().array(kept)).sort_by([("case", "ascending"), ("name", "ascending")])
+def _first_of_cases(table: Any, keys: Sequence[tuple[str, Any]]) -> tuple[Any, BoolArray]:
+    """Places of all rows sorted by case, ``keys``, and start from the last on, and which of them
+    are the first of their case."""
+    compute = arrow().compute
+    sorted_by = {"case": table["case"], **dict(keys), "started": table["run_started"]}
+    order = [(name, "descending" if name == "started" else "ascending") for name in sorted_by]
+    places = compute.sort_indices(arrow().table(sorted_by), sort_keys=order)
+    cases = table["case"].take(places).combine_chunks()
+    first = np.ones(len(cases), dtype=bool)
+    first[1:] = compute.not_equal(cases[1:], cases[:-1]).to_numpy(zero_copy_only=False)
+    return places, first

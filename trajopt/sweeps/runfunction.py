@@ -27,8 +27,9 @@ def function_named(key: str, name: str) -> Any:
         found = getattr(importlib.import_module(module), attribute)
     except TrajoptError:
         raise
-    except (ImportError, AttributeError) as error:
-        raise ArgumentError(key, name, f"a function that can be imported ({error})") from None
+    except Exception as error:  # whatever the user's module raises
+        told = f"a function that can be imported ({type(error).__name__}: {error})"
+        raise ArgumentError(key, name, told) from None
     if not callable(found):
         raise ArgumentError(key, name, "a function")
     return found

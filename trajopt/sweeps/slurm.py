@@ -17,27 +17,33 @@ import subprocess
 import sys
 import time
 import uuid
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from trajopt.arrays import IntArray
 from trajopt.errors import ArgumentError, TrajoptError
+from trajopt.files import DamageError, digest
 from trajopt.sweeps.cases import CaseTable
 from trajopt.sweeps.child import THREAD_VARIABLES
-from trajopt.sweeps.drive import MOST_CASES, chunk_name, sampled
+from trajopt.sweeps.drive import MOST_CASES, Setup
 from trajopt.sweeps.host import CaseLimits, ChunkJob, parameter_kinds, run_chunk
 from trajopt.sweeps.rows import arrow
 from trajopt.sweeps.runfunction import RunFunction, name_of, packed
-from trajopt.sweeps.store import Store
+from trajopt.sweeps.source import code_of
+from trajopt.sweeps.store import Store, open_store
 from trajopt.sweeps.supervisor import end_child
-from trajopt.sweeps.sweeps import close_record, known_kinds, missing, record_run, sweep
+from trajopt.sweeps.sweeps import Old, close_record, known_kinds, missing, record_run, sweep
+from trajopt.sweeps.upkeep import align
 
 CHUNK_SECONDS = 5.0  # work between two parts of an element: what a killed element loses; chosen
 ELEMENT_SECONDS = 300.0  # work of an element, against the 0.5 s that Slurm takes for one; chosen
+_WAIT = 2.0  # s between looks at the queue; chosen
 MOST_ELEMENTS = 1000  # Slurm's default MaxArraySize is 1001
 
 
@@ -61,6 +67,31 @@ class SlurmOptions:
     def __post_init__(self) -> None:
         if not 0 <= self.elements <= MOST_ELEMENTS:
             raise ArgumentError("elements", self.elements, f"0 .. {MOST_ELEMENTS}")
+        for name in ("time", "memory", "partition", "extra"):
+            value = getattr(self, name)
+            texts = value if name == "extra" else () if value is None else (value,)
+            if not all(isinstance(t, str) and t and t.isprintable() for t in texts):
+                raise ArgumentError(name, value, "a text in one line, as sbatch takes it")
+
+    def arguments(self, folder: Path, count: int) -> list[str]:
+        """Arguments of sbatch for ``count`` elements that log into ``folder``. Never read by a
+        shell. Raises ArgumentError for a folder that Slurm cannot be told."""
+        if "\\" in str(folder) or not str(folder).isprintable():
+            raise ArgumentError("store", str(folder), "a printable path without backslashes")
+        limit = f"%{self.at_once}" if self.at_once else ""
+        return [
+            "--job-name=trajopt-sweep",
+            f"--array=0-{count - 1}{limit}",
+            "--ntasks=1",
+            "--cpus-per-task=1",
+            f"--mem={self.memory}",
+            f"--time={self.time}",
+            "--requeue",
+            "--open-mode=append",
+            f"--output={str(folder).replace('%', '%%')}/element-%a.log",
+            *([f"--partition={self.partition}"] if self.partition else []),
+            *self.extra,
+        ]
 
 
 @dataclass(frozen=True)
@@ -82,7 +113,9 @@ def submit(
     limits: CaseLimits,
     options: SlurmOptions,
     source: str = "",
+    code: str | None = None,
     retry_failed: bool = False,
+    old: Old | None = None,
     wait: bool = False,
     case_seconds: float | None = None,
 ) -> Submission:
@@ -95,9 +128,12 @@ def submit(
         raise SlurmError(
             "sbatch is not installed here: submit from a Slurm login node, or use sweep run"
         )
+    made_by = code_of(run, code)
+    choice: dict[str, Any] = {"retry_failed": retry_failed, "old": old}
+    places = missing(table, store, made_by, **choice)
     if case_seconds is None:
-        case_seconds = _sampled_seconds(table, run, store, limits, retry_failed)
-    places = missing(table, store, retry_failed=retry_failed)
+        case_seconds = _sampled_seconds(table, run, store, limits, code, choice)
+        places = missing(table, store, made_by, **choice)
     folder = (
         store.path
         / "jobs"
@@ -105,29 +141,37 @@ def submit(
     )
     if not len(places):
         return Submission("", 0, 0, folder)
-    jobs = _chunks(table, places, run, store, limits, case_seconds)
+    engine = "Slurm array"
+    run_id = record_run(store, table, len(places), name_of(run), engine, source, limits, made_by)
+    setup = Setup(store, run_id, packed(run), limits, parameter_kinds(table), made_by.digest)
+    jobs = _chunks(table, places, setup, case_seconds)
     count = options.elements or round(len(places) * case_seconds / ELEMENT_SECONDS)
     count = min(max(count, 1), len(jobs), MOST_ELEMENTS)
     for number in range(count):
-        store.write_text(f"jobs/{folder.name}/element-{number}.log", "")
-        todo = partial(pickle.dump, jobs[number::count])
-        store.write(f"jobs/{folder.name}/element-{number}.pickle", todo)
-    script = _script(folder, count, options)
-    store.write_text(f"jobs/{folder.name}/array.sh", script)
-    run_id = record_run(
-        store, table, len(places), name_of(run), f"Slurm array of {count}", source, limits
-    )
-    job = _sbatch(folder / "array.sh", wait)
-    if wait:
-        store.align()
+        store.write(f"jobs/{folder.name}/element-{number}.log", b"")
+        todo = pickle.dumps(jobs[number::count])
+        store.write(f"jobs/{folder.name}/element-{number}.pickle", digest(todo).encode() + todo)
+    store.write(f"jobs/{folder.name}/array.sh", _script(folder).encode())
+    job = _sbatch(folder / "array.sh", options.arguments(folder.resolve(), count))
     close_record(store, run_id, f"submitted as job {job}", {})
+    if wait:
+        while subprocess.run(
+            ["squeue", "--noheader", f"--jobs={job}"], capture_output=True, text=True, check=False
+        ).stdout.strip():
+            time.sleep(_WAIT)
+        align(store)
     return Submission(job, count, len(places), folder)
 
 
 def element(folder: str, number: int) -> int:
     """Run one array element: exit code 0 when all its cases have rows, 75 (try again) when it was
     told to stop."""
-    jobs: list[ChunkJob] = pickle.loads((Path(folder) / f"element-{number}.pickle").read_bytes())
+    file = Path(folder) / f"element-{number}.pickle"
+    data = file.read_bytes()
+    if digest(data[32:]).encode() != data[:32]:
+        raise DamageError(f"{file}: damaged: submit the sweep again")
+    jobs: list[ChunkJob] = pickle.loads(data[32:])
+    known = _stored(jobs)
     told: list[int] = []
 
     def tell(signum: int, _: FrameType | None) -> None:
@@ -137,7 +181,7 @@ def element(folder: str, number: int) -> int:
     signal.signal(signal.SIGINT, tell)
     try:
         for job in jobs:
-            left = _left(job)
+            left = _left(job, known)
             if left is not None and not told:
                 report = run_chunk(left, lambda: bool(told))
                 print(f"{job.name}: {dict(report.counts)}, {report.unfinished} left", flush=True)
@@ -148,25 +192,27 @@ def element(folder: str, number: int) -> int:
     return 0
 
 
-def _left(job: ChunkJob) -> ChunkJob | None:
-    """The job without the cases that an earlier life of this element has stored; None when none is
-    left."""
-    import pyarrow.parquet as pq
+def _stored(jobs: Sequence[ChunkJob]) -> NDArray[np.bytes_]:
+    """Cases that an earlier life of this element has stored."""
+    store = open_store(jobs[0].store, create=False)
+    return store.finished(where=("run_id", jobs[0].run_id), chunks={job.name for job in jobs})
 
-    parts = Path(job.store) / "parts"
-    found = [
-        pq.read_table(f, columns=["case"], use_threads=False)["case"].to_pylist()
-        for f in [*parts.glob(f"{job.name}-*.parquet"), *parts.glob("compact-*.parquet")]
-    ]
-    known = {key.encode() for keys in found for key in keys}
-    places = np.flatnonzero([i not in known for i in job.cases.ids.tolist()])
+
+def _left(job: ChunkJob, known: NDArray[np.bytes_]) -> ChunkJob | None:
+    """The job without the ``known`` cases; None when none is left."""
+    places = np.flatnonzero(~np.isin(job.cases.ids, known))
     return replace(job, cases=job.cases.take(places)) if len(places) else None
 
 
 def _sampled_seconds(
-    table: CaseTable, run: RunFunction, store: Store, limits: CaseLimits, retry_failed: bool
+    table: CaseTable,
+    run: RunFunction,
+    store: Store,
+    limits: CaseLimits,
+    code: str | None,
+    choice: Mapping[str, Any],
 ) -> float:
-    trial = sampled(table)
+    trial = table.sampled()
     sweep(
         trial,
         run,
@@ -174,7 +220,8 @@ def _sampled_seconds(
         store=store,
         time_limit=limits.seconds,
         memory_limit=limits.memory,
-        retry_failed=retry_failed,
+        code=code,
+        **choice,
     )
     rows = store.table(["run_seconds"])
     keys = arrow().array([i.decode() for i in trial.ids.tolist()])
@@ -183,56 +230,34 @@ def _sampled_seconds(
 
 
 def _chunks(
-    table: CaseTable,
-    places: IntArray,
-    run: RunFunction,
-    store: Store,
-    limits: CaseLimits,
-    case_seconds: float,
+    table: CaseTable, places: IntArray, setup: Setup, case_seconds: float
 ) -> list[ChunkJob]:
     size = int(min(max(CHUNK_SECONDS / case_seconds, 1), MOST_CASES))
-    kinds, columns, bundle = known_kinds(store, table), parameter_kinds(table), packed(run)
-    jobs = []
-    for start in range(0, len(places), size):
-        cases = table.take(places[start : start + size])
-        jobs.append(
-            ChunkJob(
-                str(store.path.resolve()), chunk_name(cases), cases, bundle, limits, kinds, columns
-            )
-        )
-    return jobs
+    kinds, place = known_kinds(setup.store, table), str(setup.store.path.resolve())
+    return [
+        setup.job(table.take(places[start : start + size]), kinds, place)
+        for start in range(0, len(places), size)
+    ]
 
 
-def _script(folder: Path, count: int, options: SlurmOptions) -> str:
+def _script(folder: Path) -> str:
     place = folder.resolve()
     program = (
         f"import sys; sys.path[:] = {list(sys.path)!r}; from trajopt.sweeps.slurm import element; "
         f"sys.exit(element({str(place)!r}, int(sys.argv[1])))"
     )
-    limit = f"%{options.at_once}" if options.at_once else ""
     lines = [
         "#!/bin/bash",
-        "#SBATCH --job-name=trajopt-sweep",
-        f"#SBATCH --array=0-{count - 1}{limit}",
-        "#SBATCH --ntasks=1",
-        "#SBATCH --cpus-per-task=1",
-        f"#SBATCH --mem={options.memory}",
-        f"#SBATCH --time={options.time}",
-        "#SBATCH --requeue",
-        "#SBATCH --open-mode=append",
-        f"#SBATCH --output={place}/element-%a.log",
-        *([f"#SBATCH --partition={options.partition}"] if options.partition else []),
-        *(f"#SBATCH {extra}" for extra in options.extra),
         *(f"export {name}=1" for name in THREAD_VARIABLES),
         f'exec {shlex.quote(sys.executable)} -c {shlex.quote(program)} "$SLURM_ARRAY_TASK_ID"',
     ]
     return "\n".join(lines) + "\n"
 
 
-def _sbatch(script: Path, wait: bool) -> str:
-    command = ["sbatch", "--parsable", *(["--wait"] if wait else []), str(script)]
+def _sbatch(script: Path, arguments: Sequence[str]) -> str:
+    command = ["sbatch", "--parsable", *arguments, str(script)]
     told = subprocess.run(command, capture_output=True, text=True, check=False)
     job = told.stdout.strip().split(";")[0]
-    if not job or (told.returncode != 0 and not wait):
+    if not job or told.returncode != 0:
         raise SlurmError(f"sbatch refused {script}: {told.stderr.strip() or told.stdout.strip()}")
     return job

@@ -1,55 +1,43 @@
 """The store of a sweep: a directory of Parquet parts that is whole at every instant.
 
 - ``store.json``: format of the store
-- ``parts/*.parquet``: finished cases, one row a case; pandas, polars and DuckDB read them as they
-are
-- ``arrays/*.parquet``: arrays that run functions returned: case, name, shape, values
-- ``runs/*.json``: who ran what, with which versions, when
+- ``parts/*.parquet``: finished cases, one row a case; pandas, polars, DuckDB read them as they are
+- ``arrays/*.parquet``: arrays of run functions: case, start of its run, name, shape, values
+- ``runs/*.json``: who ran what, with which versions and source, when
 - ``jobs/``: what Slurm array elements are to do
-- ``temporary/``: files being written
+- ``temporary/``: files being written; ``damaged/``: files that ``repair`` took out
 
 A part is written under a temporary name, flushed to disk and renamed, and never changed afterwards.
-Its name is its chunk's and a random one, so that several writers never meet. Rows of the same case
-may exist several times; reading keeps one: a finished one before a failed one, then the last.
+Its name is its chunk's, a random one, so that several writers never meet, and its checksum. Rows of
+the same case may exist several times; reading keeps one: of the code that ran last, a finished one
+before a failed one, then the last. ``upkeep.py`` merges, verifies and repairs.
 """
 
 from __future__ import annotations
 
 import errno
-import json
 import os
 import time
 import uuid
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from trajopt.arrays import Array
-from trajopt.errors import TrajoptError
-from trajopt.sweeps.merging import (
-    common_schema,
-    conformed,
-    one_array_a_name,
-    one_row_a_case,
-    united,
-)
-from trajopt.sweeps.rows import DONE, arrow
+from trajopt.arrays import Array, BoolArray
+from trajopt.files import DamageError, seal, unseal
+from trajopt.sweeps.merging import one_row_a_case, united
+from trajopt.sweeps.parts import StoreError, chunk_of, encoded, part_table, parts_in
+from trajopt.sweeps.rows import DONE, KEY_COLUMNS, RUN_COLUMNS, arrow
 
-FORMAT = 1
+FORMAT = 2
+COMPACT = "compact"  # chunk name of merged parts
 _FOLDERS = ("temporary", "parts", "arrays", "runs", "jobs")  # the first marks a store
-_STALE = 24 * 3600.0  # s after which a temporary file's writer is taken for dead; chosen
 _READ_TRIES = 100  # listings of the parts before giving up, while compactions go on; chosen
-_COMPACT_ROWS = 1_000_000  # rows of one compacted part, to bound memory; chosen
-_ALIGNED_TOGETHER = 100  # parts of at most 10,000 rows that become one in ``align``; chosen
-
-
-class StoreError(TrajoptError):
-    """A store cannot be used: a wrong format, a damaged part, no space left."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +48,7 @@ class Store:
 
     # -- writing
 
-    def write(self, place: str, write: Callable[[BinaryIO], object]) -> None:
+    def write(self, place: str, data: bytes) -> None:
         """Write the file ``place`` of the store durably: temporary name, flush, rename.
 
         Raises StoreError when the disk is full or the directory cannot be written; nothing
@@ -72,31 +60,30 @@ class Store:
             for folder in (temporary.parent, target.parent):  # git and some copies drop empty ones
                 folder.mkdir(parents=True, exist_ok=True)
             with open(temporary, "wb") as file:
-                write(file)
+                file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(temporary, target)
             _sync_directory(target.parent)
         except OSError as error:
-            temporary.unlink(missing_ok=True)
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
             raise _write_error(self.path, error) from None
 
-    def write_part(self, folder: str, name: str, table: Any) -> None:
-        """Write an Arrow table durably as ``folder/name-<random>.parquet``. Raises as ``write``."""
-        import pyarrow.parquet as pq
+    def write_part(self, folder: str, chunk: str, table: Any) -> None:
+        """Write an Arrow table durably as a part of ``folder``. Raises as ``write``."""
+        name, data = encoded(chunk, table)
+        self.write(f"{folder}/{name}", data)
 
-        place = f"{folder}/{name}-{uuid.uuid4().hex[:12]}.parquet"
-        self.write(place, lambda file: pq.write_table(table, file, compression="zstd"))
-
-    def write_text(self, place: str, text: str) -> None:
-        """Write a small file durably. Raises as ``write``."""
-        self.write(place, lambda file: file.write(text.encode()))
+    def write_record(self, place: str, content: Mapping[str, Any]) -> None:
+        """Write JSON with its checksum durably. Raises as ``write``."""
+        self.write(place, seal(content).encode())
 
     # -- reading
 
     def parts(self, folder: str = "parts") -> list[Path]:
         """Files of whole parts, sorted by name."""
-        return sorted((self.path / folder).glob("*.parquet"))
+        return parts_in(self.path / folder)
 
     def table(self, columns: Sequence[str] | None = None) -> Any:
         """All cases as one Arrow table, one row a case, sorted by case.
@@ -104,161 +91,155 @@ class Store:
         ``columns`` limits what is read (case and status always are). Raises StoreError for a
         damaged part.
         """
-        return one_row_a_case(self._union("parts", columns))
+        if columns is None:
+            return one_row_a_case(self.rows())
+        table = one_row_a_case(self.rows([*KEY_COLUMNS, *columns]))
+        wanted = [n for n in dict.fromkeys(("case", "status", *columns)) if n in table.column_names]
+        return table.select(wanted)
+
+    def stable_table(self) -> Any:
+        """``table`` without the columns of time, host and path: equal for equal sweeps, however
+        they ran."""
+        table = self.table()
+        return table.select(sorted(n for n in table.column_names if n not in RUN_COLUMNS))
 
     def frame(self, columns: Sequence[str] | None = None) -> Any:
         """``table`` as a pandas data frame."""
         return self.table(columns).to_pandas(split_blocks=True, self_destruct=True)
 
-    def finished(self, *, with_failed: bool = True) -> NDArray[np.bytes_]:
-        """Identities (n,) of cases that have a row: all, or only those that are done."""
-        table = self._union("parts", ["case", "status"])
+    def finished(
+        self,
+        *,
+        with_failed: bool = True,
+        where: tuple[str, str] | None = None,
+        chunks: Collection[str] | None = None,
+    ) -> NDArray[np.bytes_]:
+        """Identities (n,) of cases that have a row: all, or only those that are done; of all rows,
+        or those ``where`` a column has a value; of all parts, or those of ``chunks`` and merged
+        ones."""
+        column = where[0] if where else "case"
+        files = None if chunks is None else lambda f: chunk_of(f) in (COMPACT, *chunks)
+        table = self.rows(["case", "status", column], files=files)
+        compute = arrow().compute
+        if where and len(table):
+            table = table.filter(compute.equal(table[column], where[1]))
         if not with_failed:
-            table = table.filter(arrow().compute.equal(table["status"], DONE))
+            table = table.filter(compute.equal(table["status"], DONE))
         if len(table) == 0:
             return np.empty(0, dtype="S32")
         return np.unique(table["case"].to_numpy().astype("S32"))
 
     def counts(self) -> dict[str, int]:
         """Cases by status."""
-        table = self.table(["case", "status"])
-        found = table["status"].value_counts().to_pylist()
+        found = self.table(["status"])["status"].value_counts().to_pylist()
         return {
             entry["values"]: entry["counts"]
             for entry in sorted(found, key=lambda e: str(e["values"]))
         }
 
     def case(self, prefix: str) -> tuple[dict[str, Any], dict[str, Array]]:
-        """Row and arrays of the one case whose identity starts with ``prefix``. Raises
-        StoreError."""
+        """Row and arrays, of the same run, of the one case whose identity starts with ``prefix``.
+        Raises StoreError."""
         compute = arrow().compute
         table = self.table()
         table = table.filter(compute.starts_with(table["case"], prefix))
         if len(table) != 1:
             raise StoreError(
-                f"{self.path}: {len(table)} cases start with '{prefix}'; give more digits of one case"
+                f"{self.path}: {len(table)} cases start with {prefix!r}; give more digits of one case"
             )
         row = table.to_pylist()[0]
         arrays: dict[str, Array] = {}
-        beside = self._union("arrays", None, ("case", "=", row["case"]))
-        for entry in beside.to_pylist():
-            arrays[entry["name"]] = np.asarray(entry["values"], dtype=np.float64).reshape(
-                entry["shape"]
+        if row["case_arrays"]:
+
+            def mine(part: Any) -> Any:
+                same = compute.equal(part["run_started"], table["run_started"][0])
+                return part.filter(compute.and_(compute.equal(part["case"], row["case"]), same))
+
+            for entry in self.rows(folder="arrays", keep=mine).to_pylist():
+                values = np.asarray(entry["values"], dtype=np.float64)
+                arrays[entry["name"]] = values.reshape(entry["shape"])
+        if len(arrays) != row["case_arrays"]:
+            raise StoreError(
+                f"{self.path}: case {row['case']} has {len(arrays)} of its {row['case_arrays']} "
+                f"arrays: trajopt sweep repair '{self.path}', then run the sweep again"
             )
         return row, arrays
 
-    def _union(
-        self, folder: str, columns: Sequence[str] | None, where: tuple[str, str, Any] | None = None
-    ) -> Any:
-        """Rows of all parts in one table; a column that a part lacks is null there."""
-        pa = arrow()
-        import pyarrow.parquet as pq
+    def arrays(self) -> Any:
+        """Arrays of all cases of ``table``, each from the run that its row is from, as an Arrow
+        table sorted by case and name."""
+        rows, table = self.table(["run_started"]), self.rows(folder="arrays")
+        if not len(table):
+            return table
+        table = table.filter(arrow().array(present(table, rows)))
+        return table.sort_by([("case", "ascending"), ("name", "ascending")])
 
+    def rows(
+        self,
+        columns: Sequence[str] | None = None,
+        *,
+        folder: str = "parts",
+        keep: Any = None,
+        files: Any = None,
+    ) -> Any:
+        """Rows of all parts in one table, a case as often as it was stored; a column that a part
+        lacks is null there. ``keep`` filters each part's table, ``files`` the parts. Raises
+        StoreError."""
+        pa = arrow()
         tables: dict[Path, Any] = {}  # parts never change, so what was read once stays good
         for attempt in range(_READ_TRIES):
             gone = False
             for file in self.parts(folder):
-                if file in tables:
+                if file in tables or (files and not files(file)):
                     continue
                 try:
-                    wanted = None
-                    if columns is not None:
-                        names = pq.read_schema(file).names
-                        wanted = [
-                            n for n in dict.fromkeys(["case", "status", *columns]) if n in names
-                        ]
-                    # One thread: parts are small, and workers must not outnumber their cores.
-                    tables[file] = pq.read_table(
-                        file,
-                        columns=wanted,
-                        use_threads=False,
-                        memory_map=False,
-                        filters=[where] if where else None,
-                    )
-                except FileNotFoundError:  # compacted away between listing and reading: list again
+                    table = part_table(file, columns)
+                except FileNotFoundError:  # merged away between listing and reading: list again
                     gone = True
-                except (pa.ArrowInvalid, OSError) as error:
-                    raise StoreError(
-                        f"{file}: a damaged part ({error}); move it away, run again"
-                    ) from None
+                else:
+                    tables[file] = keep(table) if keep else table
             if not gone:
                 break
             time.sleep(0.01 * attempt)
         else:
             raise StoreError(f"{self.path}: compactions go on without end; read when they are done")
         if not tables:
-            return pa.table(
-                {"case": pa.array([], pa.string()), "status": pa.array([], pa.string())}
-            )
+            return pa.table(dict.fromkeys(("case", "status"), pa.array([], pa.string())))
         return united(list(tables.values()))
 
-    # -- upkeep
-
     def compact(self) -> tuple[int, int]:
-        """Merge small parts into large ones, dropping double rows; safe while sweeps run.
+        """Merge small parts into large ones; see ``upkeep.compact``."""
+        from trajopt.sweeps.upkeep import compact
 
-        Returns the number of parts before and after. New parts are on disk before old ones go.
-        """
-        before = len(self.parts())
-        import pyarrow.parquet as pq
-
-        for folder in ("parts", "arrays"):
-            sizes: dict[Path, int] = {}
-            for file in self.parts(folder):
-                with suppress(FileNotFoundError):  # another compaction was here
-                    sizes[file] = pq.read_metadata(file).num_rows
-            batches = np.cumsum(list(sizes.values()), dtype=np.int64) // _COMPACT_ROWS
-            for number in np.unique(batches):
-                batch = [f for f, n in zip(sizes, batches, strict=True) if n == number]
-                if len(batch) > 1:
-                    self._merge(folder, batch)
-        for leftover in (self.path / "temporary").glob("*"):
-            with suppress(FileNotFoundError):
-                if time.time() - leftover.stat().st_mtime > _STALE:
-                    leftover.unlink()
-        self.align()
-        return before, len(self.parts())
-
-    def align(self) -> None:
-        """Give all parts the same columns and types, as readers want that take the directory as it
-        is.
-
-        Parts differ where only some cases have a result. Those that lack a column are merged into
-        one that has it.
-        """
-        import pyarrow.parquet as pq
-
-        schemas = {}
-        for file in self.parts():
-            with suppress(FileNotFoundError):
-                schemas[file] = pq.read_schema(file)
-        common = common_schema(schemas.values())
-        columns = {f.name: f.type for f in common}
-        odd = [
-            file for file, schema in schemas.items() if {f.name: f.type for f in schema} != columns
-        ]
-        for start in range(0, len(odd), _ALIGNED_TOGETHER):
-            self._merge("parts", odd[start : start + _ALIGNED_TOGETHER], common)
-
-    def _merge(self, folder: str, files: Sequence[Path], schema: Any = None) -> None:
-        import pyarrow.parquet as pq
-
-        try:
-            tables = [pq.read_table(f, use_threads=False, memory_map=False) for f in files]
-        except FileNotFoundError:  # another compaction was here
-            return
-        table = united(tables)
-        table = one_row_a_case(table) if folder == "parts" else one_array_a_name(table)
-        self.write_part(folder, "compact", table if schema is None else conformed(table, schema))
-        for file in files:
-            file.unlink(missing_ok=True)
+        return compact(self)
 
     def runs(self) -> list[dict[str, Any]]:
-        """Metadata of all runs, oldest first."""
-        found = [
-            json.loads(p.read_text(encoding="utf-8")) for p in (self.path / "runs").glob("*.json")
-        ]
+        """Metadata of all runs, oldest first. Raises StoreError for a damaged one."""
+        found = [self.record(file) for file in self.records()]
         return sorted(found, key=lambda r: str(r.get("started")))
+
+    def records(self) -> list[Path]:
+        """Files of the records of runs."""
+        folder = self.path / "runs"
+        names = sorted(os.listdir(folder)) if folder.is_dir() else []
+        return [folder / name for name in names if name.endswith(".json")]
+
+    def record(self, file: Path) -> dict[str, Any]:
+        """A record of a run. Raises StoreError."""
+        try:
+            return unseal(file.read_bytes(), str(file))
+        except (DamageError, OSError) as error:
+            raise StoreError(f"{error}: trajopt sweep repair '{self.path}'") from None
+
+
+def present(table: Any, rows: Any) -> BoolArray:
+    """Which entries (n,) of ``table`` have case and start of a run in common with one of
+    ``rows``."""
+    keys = ["case", "run_started"]
+    known = rows.select(keys).to_pandas().drop_duplicates()
+    merged = table.select(keys).to_pandas().merge(known, how="left", on=keys, indicator=True)
+    found: BoolArray = (merged["_merge"] == "both").to_numpy()
+    return found
 
 
 def open_store(path: str | Path | Store, *, create: bool = True) -> Store:
@@ -270,28 +251,36 @@ def open_store(path: str | Path | Store, *, create: bool = True) -> Store:
         return path
     place = Path(path)
     file = place / "store.json"
-    if not file.exists():
-        if not create:
-            raise StoreError(f"{place}: no sweep store here (store.json is missing)")
-        if place.exists() and any(place.iterdir()) and not (place / "temporary").is_dir():
-            raise StoreError(f"{place}: neither empty nor a sweep store; give another directory")
-        try:
+    try:
+        if not file.exists():
+            if not create:
+                raise StoreError(f"{place}: no sweep store here (store.json is missing)")
+            if place.exists() and any(place.iterdir()) and not (place / "temporary").is_dir():
+                raise StoreError(
+                    f"{place}: neither empty nor a sweep store; give another directory"
+                )
             for folder in _FOLDERS:
                 (place / folder).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise _write_error(place, error) from None
-        Store(place).write_text(
-            "store.json", json.dumps({"format": FORMAT, "kind": "trajopt sweep"}) + "\n"
+            Store(place).write_record("store.json", {"format": FORMAT, "kind": "trajopt sweep"})
+        data = file.read_bytes()
+    except OSError as error:
+        raise _write_error(place, error) from None
+    except ValueError as error:  # NUL in a name
+        raise StoreError(f"{str(place)!r}: expected the directory of a store ({error})") from None
+    if b'"format": 1,' in data and b"checksum" not in data:
+        raise StoreError(
+            f"{place}: store of format 1, but this version reads and writes format {FORMAT}; use "
+            "the trajopt version that wrote it (see runs/*.json), read parts/ with pandas, or give "
+            "another directory"
         )
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise StoreError(f"{file}: not readable as JSON ({error})") from None
-    if not isinstance(found, Mapping) or found.get("format") != FORMAT:
-        version = found.get("format") if isinstance(found, Mapping) else found
+        found = unseal(data, str(file))
+    except DamageError as error:
+        raise StoreError(f"{error}: trajopt sweep repair '{place}'") from None
+    if found.get("format") != FORMAT:
         raise StoreError(
-            f"{place}: store of format {version!r}, but this version reads and writes format {FORMAT}; "
-            "use the trajopt version that wrote it (see runs/*.json), or another directory"
+            f"{place}: store of format {found.get('format')!r}, but this version reads and writes "
+            f"format {FORMAT}; use the trajopt version that wrote it, or another directory"
         )
     return Store(place)
 
@@ -310,4 +299,4 @@ def _write_error(path: Path, error: OSError) -> StoreError:
         return StoreError(
             f"{path}: no space left; free some and run the same command again: finished cases are kept"
         )
-    return StoreError(f"{path}: cannot write the store ({error})")
+    return StoreError(f"{path}: cannot write or read the store ({error})")

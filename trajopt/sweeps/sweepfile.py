@@ -4,36 +4,70 @@ functions and problems are found)."""
 from __future__ import annotations
 
 import re
-import tomllib
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator, Field, JsonValue
 
 from trajopt.errors import ArgumentError, ProblemError
-from trajopt.sweeps.axes import combined, with_derived
+from trajopt.schema import (
+    Positive,
+    Section,
+    broken_rule,
+    json_schema,
+    read_text,
+    tables_of,
+    validated,
+)
+from trajopt.sweeps.axes import Axis, Sample, combined, with_derived
 from trajopt.sweeps.cases import CaseTable
+from trajopt.sweeps.expressions import parse
 from trajopt.sweeps.runfunction import RunFunction, function_named
 from trajopt.sweeps.sweeps import TIME_LIMIT, tabled
 
 RUN_CASE = "trajopt.case:run_case"  # runs the cases of a problem where a file names no other
 WITH_PROBLEM = "trajopt.case:with_problem"
 
-_KEYS = (
-    "title",
-    "problem",
-    "run",
-    "code",
-    "time_limit",
-    "memory_limit",
-    "solve",
-    "axes",
-    "sample",
-    "derived",
-    "exclude",
-)
+
+def _bytes(value: Any) -> int:
+    """Bytes of a memory limit: a number, or a text with kB, MB, GB."""
+    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**62:
+        return value
+    pattern = r"\s*(\d{1,6}(?:\.\d{1,6})?)\s*([kMG])i?B?\s*"
+    match = re.fullmatch(pattern, value) if isinstance(value, str) else None
+    if match is None:
+        raise broken_rule("", value, "bytes, or a text such as '2 GB'")
+    return int(float(match[1]) * {"k": 1e3, "M": 1e6, "G": 1e9}[match[2]])
+
+
+def _list(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+class SweepFile(Section):
+    """A sweep file. ``time_limit`` of a case, s; ``memory_limit`` of a case, bytes or a text such
+    as "2 GB"; ``code`` says what code runs, instead of its source."""
+
+    source: str = ""
+    title: str | None = None
+    problem: str | None = None
+    run: str = RUN_CASE
+    code: str | None = None
+    time_limit: Positive = TIME_LIMIT
+    memory_limit: Annotated[
+        int | None,
+        BeforeValidator(_bytes, json_schema_input_type=int | str),
+    ] = None
+    solve: dict[str, JsonValue] = Field(default={})
+    axes: dict[str, Axis] = Field(default={})
+    sample: Sample | None = None
+    derived: dict[str, str] = Field(default={})
+    exclude: Annotated[
+        list[str],
+        BeforeValidator(_list, json_schema_input_type=str | list[str]),
+    ] = Field(default=[])
 
 
 @dataclass(frozen=True)
@@ -45,84 +79,69 @@ class SweepPlan:
     table: CaseTable
     time_limit: float
     memory_limit: int | None
+    code: str | None
     text: str
+
+
+def sweep_schema() -> str:
+    """JSON schema of sweep files, for editors."""
+    return json_schema(SweepFile)
 
 
 def load_sweep(path: str | Path) -> SweepPlan:
     """Read a sweep file. Raises ProblemError for what it does not know or cannot use."""
-    file = Path(path)
+    text = read_text(path)
+    tables = tables_of(text, str(path))
+    for name, axis in tables["axes"].items() if isinstance(tables.get("axes"), dict) else ():
+        for key, value in axis.items() if isinstance(axis, dict) else ():
+            if key not in Axis.model_fields and isinstance(value, dict):
+                quoted = f'a quoted name where it has dots: [axes."{name}.{key}"]'
+                raise ProblemError(str(path), f"axes.{name}.{key}", value, quoted)
+    file = validated(SweepFile, tables, str(path))
     try:
-        text = file.read_text(encoding="utf-8")
-        data = tomllib.loads(text)
-    except FileNotFoundError:
-        raise ProblemError(
-            str(path), "file", "missing", "an existing sweep file (*.toml)"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
-        raise ProblemError(str(path), "file", str(error), "valid TOML in UTF-8") from None
-    for key in data:
-        if key not in _KEYS:
-            raise ProblemError(str(path), key, data[key], "one of " + ", ".join(_KEYS))
-    try:
-        return _plan(data, file, text)
+        return _plan(file, text)
     except ArgumentError as error:
         raise ProblemError(str(path), error.argument, error.value, error.expected) from None
 
 
-def _plan(data: Mapping[str, Any], file: Path, text: str) -> SweepPlan:
-    run = _run_function(data, file.parent)
-    axes = combined(_axes(data), data.get("sample"))
-    derived, exclude = data.get("derived", {}), data.get("exclude", [])
-    rules = [exclude] if isinstance(exclude, str) else exclude
-    columns = with_derived(axes, derived, rules)
+def _plan(file: SweepFile, text: str) -> SweepPlan:
+    run = _run_function(file)
+    axes = combined(_axes(file), file.sample)
+    columns = with_derived(axes, file.derived, file.exclude)
     if not columns or not len(next(iter(columns.values()))):
-        raise ArgumentError("axes", dict(data.get("axes", {})), "axes that leave at least one case")
-    table = tabled(columns, run, data.get("code"), getattr(run, "content", None))
-    if "problem" in data:
-        formulas = " ".join(map(str, [*derived.values(), *rules]))
-        spare = [
-            n for n in axes if "." not in n and not re.search(rf"\b{re.escape(n)}\b", formulas)
-        ]
+        raise ArgumentError("axes", list(file.axes), "axes that leave at least one case")
+    table = tabled(columns, run, getattr(run, "content", None))
+    if file.problem is not None:
+        formulas = [parse("", formula) for formula in (*file.derived.values(), *file.exclude)]
+        used = {name for formula in formulas for name in formula.names}
+        spare = [name for name in axes if "." not in name and name not in used]
         run.check(table.take(np.array([0])).rows()[0], spare)
     return SweepPlan(
-        str(data.get("title", file.stem)),
+        file.title or Path(file.source).stem,
         run,
         table,
-        float(data.get("time_limit", TIME_LIMIT)),
-        _bytes(data.get("memory_limit")),
+        file.time_limit,
+        file.memory_limit,
+        file.code,
         text,
     )
 
 
-def _axes(data: Mapping[str, Any]) -> dict[str, Any]:
+def _axes(file: SweepFile) -> dict[str, Axis]:
     """Axes of the file; ``[solve]`` is short for axes ``run.*`` of one value each."""
-    axes = {f"run.{name}": {"values": [value]} for name, value in data.get("solve", {}).items()}
-    twice = axes.keys() & data.get("axes", {}).keys()
-    if twice:
+    axes = {f"run.{name}": Axis(values=(value,)) for name, value in file.solve.items()}
+    if twice := axes.keys() & file.axes.keys():
         raise ArgumentError("solve", sorted(twice), "each name once, in axes or in solve")
-    return {**axes, **data.get("axes", {})}
+    return {**axes, **file.axes}
 
 
-def _run_function(data: Mapping[str, Any], folder: Path) -> Any:
+def _run_function(file: SweepFile) -> Any:
     """The run function of the file, bound to its problem where it names one."""
-    name = data.get("run", RUN_CASE)
-    if "problem" in data:
+    if file.problem is not None:
         bind = function_named("problem", WITH_PROBLEM)
-        return bind(function_named("run", str(name)), folder / str(data["problem"]))
-    if name == RUN_CASE:
+        return bind(function_named("run", file.run), Path(file.source).parent / file.problem)
+    if file.run == RUN_CASE:
         raise ArgumentError("problem", None, "problem = 'file.toml', or run = 'module:function'")
-    if "solve" in data:
-        raise ArgumentError("solve", data["solve"], f"no such table where {RUN_CASE} does not run")
-    return function_named("run", str(name))
-
-
-def _bytes(value: Any) -> int | None:
-    """Bytes of a memory limit: a number, or a text with kB, MB, GB."""
-    if value is None or (isinstance(value, int) and not isinstance(value, bool) and value >= 0):
-        return value
-    match = (
-        re.fullmatch(r"\s*([0-9.]+)\s*(k|M|G)i?B?\s*", value) if isinstance(value, str) else None
-    )
-    if match is None:
-        raise ArgumentError("memory_limit", value, "bytes, or a text such as '2 GB'")
-    return int(float(match[1]) * {"k": 1e3, "M": 1e6, "G": 1e9}[match[2]])
+    if file.solve:
+        raise ArgumentError("solve", file.solve, f"no such table where {RUN_CASE} does not run")
+    return function_named("run", file.run)

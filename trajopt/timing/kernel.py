@@ -7,37 +7,22 @@ gap(x) = lowest upper bound - highest lower bound is concave in x, so the ends o
 gap(x) >= 0} are found by Newton's method from outside, exactly and in a few steps (each tangent is
 a pair of rows).
 
-Import this module where it is first used: numba takes a second to load. Without numba the same
-functions run interpreted: right, but slow.
+Import this module where it is first used, as all kernels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar
-
 import numpy as np
 
 from trajopt.arrays import Array, IndexArray
+from trajopt.kernels import kernel
 from trajopt.timing.stages import SD2_CAP
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 _FLAT = 1e-13  # a row (divided by its scale) with a smaller coefficient of u does not bound u
 _TOUCH = 1e-12  # relative gap between bounds that counts as closed
 
 
-def _compiled(function: Callable[P, R]) -> Callable[P, R]:
-    try:
-        from numba import njit
-    except ImportError:
-        return function
-    compiled: Callable[P, R] = njit(cache=True, error_model="numpy", nogil=True)(function)
-    return compiled
-
-
-@_compiled
+@kernel(nogil=True)
 def _bounds_on_u(
     a: Array, b: Array, c: Array, i: int, d: float, low: float, high: float, x: float
 ) -> tuple[float, float, float, float, float, float, int, int]:
@@ -73,7 +58,7 @@ def _bounds_on_u(
     return n_up / p_up, -q_up / p_up, n_low / p_low, -q_low / p_low, x_max, x_min, up, lower
 
 
-@_compiled
+@kernel(nogil=True)
 def _row(
     a: Array,
     b: Array,
@@ -95,7 +80,7 @@ def _row(
     return a[j, r] + grow * b[j, r], b[j, r], c[j, r]
 
 
-@_compiled
+@kernel(nogil=True)
 def _crossing(
     a: Array,
     b: Array,
@@ -120,7 +105,7 @@ def _crossing(
     return x_cap
 
 
-@_compiled
+@kernel(nogil=True)
 def _end_of_feasible(
     a: Array,
     b: Array,
@@ -167,7 +152,7 @@ def _end_of_feasible(
     return np.nan, -1, -1
 
 
-@_compiled
+@kernel(nogil=True)
 def controllable(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, sets: Array) -> int:
     """Backward pass: fills sets (G, 2), the s'^2 from which sets[-1] can be reached.
 
@@ -203,7 +188,7 @@ def controllable(s: Array, a: Array, b: Array, c: Array, sd2_max: Array, sets: A
     return -1
 
 
-@_compiled
+@kernel(nogil=True)
 def fastest(s: Array, a: Array, b: Array, c: Array, sets: Array, start: float, sd2: Array) -> None:
     """Forward pass: fills sd2 (G,), the greedy (and optimal) profile inside the controllable
     sets."""
@@ -224,7 +209,7 @@ def fastest(s: Array, a: Array, b: Array, c: Array, sets: Array, start: float, s
         sd2[i + 1] = min(max(x, sets[i + 1, 0]), sets[i + 1, 1])
 
 
-@_compiled
+@kernel(nogil=True)
 def bounds_of_intervals(s: Array, a: Array, c: Array, lowest: Array, highest: Array) -> bool:
     """Fills lowest and highest (G-1,), the bounds on u in each interval, from rows a u <= c without
     x.
@@ -250,7 +235,7 @@ def bounds_of_intervals(s: Array, a: Array, c: Array, lowest: Array, highest: Ar
     return True
 
 
-@_compiled
+@kernel(nogil=True)
 def controllable_in_bounds(
     s: Array, lowest: Array, highest: Array, sd2_max: Array, sets: Array
 ) -> int:
@@ -271,7 +256,7 @@ def controllable_in_bounds(
     return -1
 
 
-@_compiled
+@kernel(nogil=True)
 def fastest_in_bounds(s: Array, highest: Array, sets: Array, start: float, sd2: Array) -> None:
     """Forward pass of ``fastest`` where u has bounds of its own."""
     sd2[0] = start
@@ -281,7 +266,7 @@ def fastest_in_bounds(s: Array, highest: Array, sets: Array, start: float, sd2: 
         sd2[i + 1] = min(max(x, sets[i + 1, 0]), sets[i + 1, 1])
 
 
-@_compiled
+@kernel(nogil=True)
 def fastest_of_many(
     s: Array,
     a: Array,

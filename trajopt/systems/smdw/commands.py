@@ -24,6 +24,7 @@ from trajopt.cli.shared import (
     overrides,
 )
 from trajopt.errors import ArgumentError
+from trajopt.report.words import words
 
 if TYPE_CHECKING:
     from trajopt.problem import Problem
@@ -48,8 +49,7 @@ def plan(
     solution = solve(_climb(load_problem(problem, overrides(set_))), optimizer=optimizer, seed=seed)
     found = cast("Maneuver", solution.details)
     console.print(
-        f"[bold]{found.problem.title}[/bold]: {found.status} ({found.wall_time:.2f} s)",
-        highlight=False,
+        words((found.problem.title, "bold"), f": {found.status} ({found.wall_time:.2f} s)")
     )
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in (
@@ -78,7 +78,7 @@ def plan(
     for none in (
         found.refused if found.plans else ()
     ):  # the status names why there is no plan at all
-        console.print(f"no plan for {none.configuration.name}: {none.reason}", highlight=False)
+        console.print(f"no plan for {none.configuration.name}: {none.reason}")
     if out is not None:
         from trajopt.report.run_folder import write_solution
 
@@ -90,7 +90,7 @@ def plan(
             )  # what all plans share stands beside their folders
             write_solution(alone, folder, seed=seed, command=" ".join(sys.argv), pictures=pictures)
         found.save(out, pictures=pictures)
-        console.print(f"written to {out}", highlight=False, soft_wrap=True)
+        console.print(f"written to {out}", soft_wrap=True)
     if not found.plans:
         raise typer.Exit(FAULTY)
 
@@ -171,7 +171,7 @@ def climb(
     if out is not None:
         if pictures:
             save_climb_trials_picture(done, found.problem, chosen, out)
-        console.print(f"written to {out}", highlight=False, soft_wrap=True)
+        console.print(f"written to {out}", soft_wrap=True)
 
 
 def _climb(problem: Problem) -> Problem:
