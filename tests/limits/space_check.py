@@ -199,9 +199,11 @@ def used(trajectory: Trajectory, limits: Sequence, now: Instant) -> dict[str, fl
             case Speed():
                 found[limit.name] = planar(now, velocity) / limit.largest
             case Acceleration():
-                # of the translational speed, along the direction of travel
-                speed = planar(now, velocity)
-                along = velocity @ now.second(now.position) / speed if speed > 1e-3 else 0.0
+                before, after = (
+                    np.hypot(*((now.position[i + 1] - now.position[i - 1]) @ now.rotation[i, :, :2]))
+                    for i in (1, 3)
+                )
+                along = (after - before) / (2 * now.h) ** 2
                 found[limit.name] = max(along / limit.forward, -along / limit.braking)
             case YawRate():
                 found[limit.name] = abs(now.turning @ now.axes[:, 2]) / limit.largest

@@ -177,21 +177,48 @@ def test_along_the_contour_of_8_5_degrees():
     assert np.max(rows.c[0, down] / rows.a[0, down]) == pytest.approx(-1.91, abs=0.005)
 
 
+def trailing(radius: float) -> np.ndarray:
+    """Contacts of PowerBot's castors on a circle to the left: trailing along a smaller circle."""
+    found = []
+    for y in (0.22, -0.22):
+        out = np.array([-0.31, y - radius])  # from the centre of the circle to the pivot
+        far, trail = np.hypot(*out), 0.04
+        lean = np.arcsin(trail / far)
+        ahead = np.array([-out[1], out[0]]) / far
+        t = np.cos(lean) * ahead + np.sin(lean) * out / far
+        found.append([-0.31, y] - trail * t)
+    return np.array(found)
+
+
 def test_a_circle_of_two_metres_on_8_5_degrees():
-    """At its lowest point the circle leans outward downhill: 1.06 m/s, at its highest 1.9 m/s."""
-    slope, angle = np.radians(8.5), np.linspace(0, 2 * np.pi, 181)
+    """At its lowest point the circle leans outward downhill: 1.06 m/s braking there, 1.047 m/s at
+    steady speed; at its highest 2.6 m/s at steady speed."""
+    slope, angle = np.radians(8.5), np.linspace(0, 3 * np.pi, 271)
     plan = 2 * np.column_stack([np.sin(angle), -np.cos(angle) * np.cos(slope)])
-    path = Path.through(plan, start_direction=(1, 0), end_direction=(1, 0))
-    one = robot("powerbot")
-    on = track(path, one, Plane(slope, UP))
-    assert on.path.length == pytest.approx(4 * np.pi, rel=1e-5)
-    for share, expected in ((1.0, 1.06), (0.5, 1.82)):
-        s = np.array([share * on.path.length])
-        samples = on.samples(s, on.path.locate(s) - (1e-6 if share == 1 else 0))
-        slip = Slip(0.332, sides=720)
-        speeds = np.linspace(0.5, 2.5, 2001)
-        kept = [slip.needed(samples, one, np.zeros(1), np.array([v**2]))[0] <= 1 for v in speeds]
-        assert speeds[int(np.argmin(kept))] == pytest.approx(expected, abs=0.01)
+    path = Path.through(plan, start_direction=(1, 0), end_direction=(-1, 0))
+    one, plane = robot("powerbot"), Plane(slope, UP)
+    on = track(path, one, plane)
+    lap = 4 * np.pi
+    assert on.path.length == pytest.approx(1.5 * lap, rel=1e-5)
+    arms = np.vstack([[[0, 0.268], [0, -0.268]], trailing(2.0)]) + [0.132, 0.0]
+    balance = np.vstack([np.ones(4), arms.T])
+
+    def over(v: float, side: float) -> float:
+        """Force of the drive wheels at steady speed over their friction, per unit mass."""
+        force = np.array([v**2 * 0.132 / 4, v**2 / 2 + side * G * np.sin(slope)])
+        loads = np.linalg.pinv(balance) @ [G * np.cos(slope), *(-0.215 * force)]
+        return float(np.hypot(*force) - 0.332 * loads[:2].sum())
+
+    for share, side, low, expected in ((1.0, 1.0, 0.1, 1.047), (0.5, -1.0, 2.0, 2.606)):
+        s = np.array([share * lap])
+        samples = on.samples(s, on.path.locate(s))
+        np.testing.assert_allclose(contact_points(samples, one)[0, 2:], trailing(2.0), atol=1e-5)
+        steady = brentq(over, low, 2.8, args=(side,))
+        assert steady == pytest.approx(expected, abs=0.005)
+        needed = Slip(0.332).needed(samples, one, np.zeros(1), np.array([steady**2]))
+        assert needed[0] == pytest.approx(1.0, abs=1e-3)  # a spline through points on the circle
+    lapped = time_scale(path, [Slip(0.332, sides=256), Tip()], robot=one, ground=plane)
+    assert np.interp(lap, lapped.s, lapped.sd) == pytest.approx(1.06, abs=0.005)
 
 
 @pytest.mark.parametrize(
@@ -243,17 +270,27 @@ def test_slopes_that_were_accepted_are_refused():
         time_scale(slide, [*drive, Slip(0.2)], robot=loc8, ground=ground)
 
 
-def test_a_plane_path_over_a_ramp_is_the_path_laid_over_it():
-    ramp = Ramp((2.0, 0.0), 0.0, 4.0, 0.5, 0.35)
+@pytest.mark.parametrize("name", ["powerbot", "car", "tricycle", "small-differential"])
+@pytest.mark.parametrize("edge", ["mean", "smooth"])
+def test_a_plane_path_over_ramps_is_the_path_laid_over_them_by_hand(name, edge):
+    """Speeding up on one ramp and braking down another. A mean edge bends at once, which a spline
+    through points cannot: only the ground knows how the robot pitches there."""
+    up = Ramp((0.5, 0.0), 0.0, 4.0, 0.35, 0.5, edge)
+    ground = Ramps((up, Ramp((5.5, 0.0), 0.0, 2.0, -0.2, 0.5, edge)), 0.3)
     limits = [Speed(2.0), Acceleration(1.0, 1.0), Slip(0.332), Tip()]
-    one, path = robot("powerbot"), Path.through([[0, 0], [8, 0]])
-    flat, over = (
-        time_scale(path, limits, robot=one, ground=ground) for ground in (None, Ramps((ramp,), 0.3))
-    )
-    assert over.duration > flat.duration + 0.05
-    climb = Path.through(over.path.position(np.linspace(over.path.start, over.path.end, 400)))
-    by_hand = time_scale(climb, limits, robot=one)
-    assert by_hand.duration == pytest.approx(over.duration, rel=2e-3)
+    one, path = robot(name), Path.through([[0, 0], [8, 0]])
+
+    def duration(path: Path, ground: Ramps | None) -> float:
+        return time_scale(path, limits, robot=one, ground=ground, gridpoints=1600).duration
+
+    over = duration(path, ground)
+    assert over > duration(path, None) + (0.04 if name in ("powerbot", "tricycle") else 0.01)
+    edges = [np.linspace(c - 0.3, c + 0.3, 61) for c in (0.5, 4.5, 5.5, 7.5)]
+    x = np.unique(np.round(np.concatenate([np.linspace(0, 8, 81), *edges]), 9))
+    by_hand = Path.through(np.column_stack([x, 0 * x, ground.height(x, 0 * x)]))
+    assert duration(by_hand, ground) == pytest.approx(over, rel=1e-3)
+    if edge == "smooth":
+        assert duration(by_hand, None) == pytest.approx(over, rel=1e-3)
 
 
 # -- invariances -----------------------------------------------------------------------------------
