@@ -174,9 +174,9 @@ def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
         angle = wheel.angle + now.steering[2, k]
         if wheel.rollers is not None:
             angles = [angle + wheel.rollers.angle] if wheel.name in driven else []
-        elif wheel.kind == "spherical":
-            angles = []
-        elif wheel.kind == "castor" and not any(wheel.name in p for p in pivots):
+        elif wheel.kind == "spherical" or (
+            wheel.kind == "castor" and not any(wheel.name in p for p in pivots)
+        ):
             angles = []
         else:
             angles = [angle] if wheel.name in driven else []
