@@ -12,9 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import RegularGridInterpolator
 
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.contact import Contact
+from trajopt.limits.friction import Friction, FrictionAlong, FrictionMap
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.steering_acceleration import SteeringAcceleration
@@ -24,6 +26,7 @@ from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.robots.robot import Robot
+from trajopt.timing.track import Track
 from trajopt.timing.trajectory import Trajectory
 
 G = 9.80665
@@ -40,6 +43,7 @@ class Instant:
     rotation: np.ndarray
     spin: np.ndarray
     steering: np.ndarray
+    s: float  # path parameter
 
     def rate(self, values: np.ndarray) -> np.ndarray:
         return np.tensordot(FIRST, values, axes=1) / self.h
@@ -84,11 +88,22 @@ def instants(trajectory: Trajectory, count: int, rng: np.random.Generator) -> li
     for i in rng.choice(wide, min(count, len(wide)), replace=False):
         h = min(widths[i] / 5, 4e-3)
         middle = trajectory.times[i] + widths[i] * rng.uniform(0.45, 0.55)
-        state = trajectory.at(middle + h * np.arange(-2, 3))
-        found.append(
-            Instant(h, state.position, state.rotation, state.spin_angles, state.steering_angles)
-        )
+        times = middle + h * np.arange(-2, 3)
+        state, s = trajectory.at(times), float(trajectory.along(times)[0][2])
+        angles = state.spin_angles, state.steering_angles
+        found.append(Instant(h, state.position, state.rotation, *angles, s))
     return found
+
+
+def instant_of(track: Track, s: float, sdd: float, sd2: float, h: float = 1e-3) -> Instant:
+    """At s, with s'^2 and a constant s'', whatever the limits."""
+    t = h * np.arange(-2, 3)
+    places = s + np.sqrt(sd2) * t + sdd * t**2 / 2
+    u = track.path.locate(places)
+    samples = track.samples(places, u)
+    assert samples.wheels is not None
+    angles = track.wheels.at(u), samples.wheels.steering
+    return Instant(h, samples.position, samples.rotation, *angles, s)
 
 
 def contact_slips(robot: Robot, now: Instant) -> np.ndarray:
@@ -123,6 +138,7 @@ class Statics:
     moment: np.ndarray
     arms: np.ndarray
     loads: np.ndarray
+    cog: np.ndarray
 
 
 def statics(robot: Robot, now: Instant) -> Statics:
@@ -143,7 +159,7 @@ def statics(robot: Robot, now: Instant) -> Statics:
     tilt = moment - np.cross([0.0, 0.0, -body.cog[2]], [force[0], force[1], 0.0])
     balance = np.vstack([np.ones(len(arms)), arms[:, 1], -arms[:, 0]])
     loads = np.linalg.lstsq(balance, np.array([force[2], tilt[0], tilt[1]]))[0]
-    return Statics(force, moment, arms, loads)
+    return Statics(force, moment, arms, loads, np.array(body.cog))
 
 
 def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
@@ -158,9 +174,9 @@ def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
         angle = wheel.angle + now.steering[2, k]
         if wheel.rollers is not None:
             angles = [angle + wheel.rollers.angle] if wheel.name in driven else []
-        elif wheel.kind == "spherical":
-            angles = []
-        elif wheel.kind == "castor" and not any(wheel.name in p for p in pivots):
+        elif wheel.kind == "spherical" or (
+            wheel.kind == "castor" and not any(wheel.name in p for p in pivots)
+        ):
             angles = []
         else:
             angles = [angle] if wheel.name in driven else []
@@ -186,10 +202,8 @@ def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
     }
 
 
-def used(trajectory: Trajectory, limits: Sequence, now: Instant) -> dict[str, float]:
+def used(robot: Robot, limits: Sequence, now: Instant) -> dict[str, float]:
     """How much of every limit an instant uses; 1 is all of it."""
-    robot = trajectory.robot
-    assert robot is not None
     velocity = now.rate(now.position)
     rolling = [[w.name for w in robot.description.wheels].index(n) for n in robot.wheel_names]
     there = statics(robot, now)
@@ -199,9 +213,13 @@ def used(trajectory: Trajectory, limits: Sequence, now: Instant) -> dict[str, fl
             case Speed():
                 found[limit.name] = planar(now, velocity) / limit.largest
             case Acceleration():
-                # of the translational speed, along the direction of travel
-                speed = planar(now, velocity)
-                along = velocity @ now.second(now.position) / speed if speed > 1e-3 else 0.0
+                before, after = (
+                    np.hypot(
+                        *((now.position[i + 1] - now.position[i - 1]) @ now.rotation[i, :, :2])
+                    )
+                    for i in (1, 3)
+                )
+                along = (after - before) / (2 * now.h) ** 2
                 found[limit.name] = max(along / limit.forward, -along / limit.braking)
             case YawRate():
                 found[limit.name] = abs(now.turning @ now.axes[:, 2]) / limit.largest
@@ -257,14 +275,36 @@ def tip_margin(found: Statics) -> float:
 
 
 def slip_used(robot: Robot, now: Instant, there: Statics, limit: Slip) -> float:
+    return max(
+        force / max(hold, 1e-9) for force, hold in forces_and_holds(robot, now, there, limit)
+    )
+
+
+def forces_and_holds(
+    robot: Robot, now: Instant, there: Statics, limit: Slip
+) -> list[tuple[float, float]]:
+    """Force and friction times load, m/s^2, of every wheel that holds, or of all together."""
     driven = {name for motor in robot.description.motors for name in motor.wheels}
-    wheels = robot.description.wheels
+    wheels, mu = robot.description.wheels, friction_under(now, there, limit.friction)
     forces = shares(robot, now, there)
     alone = all(wheels[k].kind in ("fixed", "steered") and wheels[k].name in driven for k in forces)
     if alone and not limit.per_wheel:
-        load = sum(there.loads[k] for k in forces)
-        return float(np.hypot(*there.force[:2]) / (limit.friction * load))
-    return max(
-        float(np.hypot(*f) / (limit.friction * max(there.loads[k], 1e-9)))
-        for k, f in forces.items()
-    )
+        hold = sum(mu[k] * there.loads[k] for k in forces)
+        return [(float(np.hypot(*there.force[:2])), hold)]
+    return [(float(np.hypot(*f)), mu[k] * there.loads[k]) for k, f in forces.items()]
+
+
+def friction_under(now: Instant, there: Statics, friction: Friction) -> np.ndarray:
+    """(K,) under every wheel."""
+    count = len(there.loads)
+    if isinstance(friction, FrictionAlong):
+        return np.full(count, np.interp(now.s, friction.places, friction.values))
+    if isinstance(friction, FrictionMap):
+        places = now.position[2] + (there.arms + there.cog) @ now.axes.T
+        rows, columns = np.shape(friction.values)
+        x, y = (
+            friction.origin[k] + friction.spacing * np.arange(n)
+            for k, n in ((0, columns), (1, rows))
+        )
+        return RegularGridInterpolator((x, y), np.asarray(friction.values).T)(places[:, :2])
+    return np.broadcast_to(np.asarray(friction, dtype=float), (count,))

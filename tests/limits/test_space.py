@@ -26,7 +26,7 @@ def require_kept(seeds: Iterable[int]) -> tuple[int, float]:
         found += 1
         for now in instants(motion, 15, np.random.default_rng(seed)):
             assert contact_slips(motion.robot, now).max() < ROLLS, seed
-            shares = used(motion, motion.limits, now)
+            shares = used(motion.robot, motion.limits, now)
             assert max(shares.values()) < KEPT, (seed, shares)
             most = max(most, *shares.values())
     return found, most

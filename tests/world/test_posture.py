@@ -11,6 +11,7 @@ from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
 from trajopt.world.laid import lay
 from trajopt.world.posture import frame_on, samples_of, samples_on, twist_bend
+from trajopt.world.terrain import Flat
 
 CORNERS = np.array([[0.3, 0.2], [0.3, -0.2], [-0.3, 0.2], [-0.3, -0.2]])
 PLACES = np.array([0.333, 1.234, 2.2])
@@ -42,6 +43,10 @@ def require_derivatives(at) -> None:
     np.testing.assert_array_equal(here.twist[:, :2], here.velocity[:, :2])
     np.testing.assert_array_equal(here.twist[:, 2], here.turning[:, 2])
     np.testing.assert_allclose(here.gravity, -r[:, 2, :], atol=1e-12)
+    bend = np.einsum("ni,ni->n", r[:, :, 2], np.cross(tangent, second))
+    pace = np.linalg.norm(tangent, axis=1)
+    np.testing.assert_allclose(here.curvature, bend / pace**3, atol=1e-6)
+    np.testing.assert_allclose(here.slope, np.arcsin(tangent[:, 2] / pace), atol=1e-6)
 
 
 @pytest.mark.parametrize("contacts", [None, CORNERS], ids=["tangent", "contacts"])
@@ -58,6 +63,11 @@ def test_samples_without_ground_are_derivatives_of_poses(kind):
     climbing = Path.through([[0, 0, 0], [1, 0.4, 0.2], [2, -0.2, 0.1], [3, 0.5, 0.4]])
     path = {"plane": PATHS["along"], "climbing": climbing, "own": PATHS["own"]}[kind]
     require_derivatives(lambda s: sample_path(path, s))
+    flat = lambda s: samples_on(Flat(), path, s, path.locate(s))  # noqa: E731
+    require_derivatives(flat)
+    one, other = sample_path(path, PLACES), flat(PLACES)
+    for name in ("rotation", "twist", "twist_rate", "turning_rate", "acceleration_rate"):
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), atol=1e-9)
 
 
 @pytest.mark.parametrize("contacts", [None, CORNERS], ids=["tangent", "contacts"])
@@ -105,3 +115,22 @@ def test_wheels_that_stand_lower_tilt_the_robot():
     np.testing.assert_allclose(up[:, 0] / np.hypot(up[:, 1], up[:, 2]), pitch, rtol=2e-2, atol=2e-4)
     with pytest.raises(ArgumentError, match="line"):
         samples_on(HILLS, path, s, path.locate(s), CORNERS * [1, 0])
+
+
+@pytest.mark.parametrize("kind", PATHS)
+@pytest.mark.parametrize("contacts", [CORNERS, CORNERS[:3] - [0.1, 0.05]], ids=["four", "three"])
+def test_wheels_stand_on_the_plane_nearest_to_the_ground_under_them(kind, contacts):
+    path, s = lay(PATHS[kind], HILLS), np.linspace(0.2, 2.8, 9)
+    u = path.locate(s)
+    found = samples_on(HILLS, path, s, u, contacts)
+    plan = path.position(u)[:, :2]
+    ahead = path.position(u, 1)
+    yaw = path.yaw(u) if kind == "own" else np.arctan2(ahead[:, 1], ahead[:, 0])
+    for i in range(len(s)):
+        cos, sin = np.cos(yaw[i]), np.sin(yaw[i])
+        at = plan[i] + contacts @ np.array([[cos, sin], [-sin, cos]])
+        basis = np.column_stack([np.ones(len(at)), at - plan[i]])
+        z, a, b = np.linalg.lstsq(basis, HILLS.partial(at[:, 0], at[:, 1], 0, 0))[0]
+        assert found.position[i, 2] == pytest.approx(z, abs=1e-12)
+        up = np.array([-a, -b, 1.0]) / np.sqrt(1 + a * a + b * b)
+        np.testing.assert_allclose(found.rotation[i, :, 2], up, atol=1e-12)

@@ -21,11 +21,11 @@ class Acceleration:
     """Rate of translational speed between -``braking`` and ``forward``, m/s^2 ([waheed2006], eqs.
     2.7, 2.8).
 
-    The speed is v = p s' with p = |(twist_x, twist_y)|, so v' = p s'' + (d . acceleration_rate)
-    s'^2 with d the direction of travel in the body frame: exactly linear, and equal to s'' where
-    the robot drives along its heading. Centripetal acceleration does not count (that is what
-    ``Slip`` is for), and a turn on the spot is not bounded (that is what ``WheelAcceleration`` is
-    for). Raises ArgumentError unless both are > 0.
+    The speed is v = p s' with p = |(twist_x, twist_y)|, so v' = p s'' + (d . twist_rate) s'^2 with
+    d the direction of travel in the body frame: exactly linear, and equal to s'' where the robot
+    drives along its heading. Centripetal acceleration does not count (that is what ``Slip`` is
+    for), nor what the robot does along its normal over a crest, and a turn on the spot is not
+    bounded (that is what ``WheelAcceleration`` is for). Raises ArgumentError unless both are > 0.
     """
 
     forward: float  # m/s^2
@@ -42,7 +42,7 @@ class Acceleration:
         moving = p > _MOVING
         direction = np.where(moving[:, None], travel / np.where(moving, p, 1.0)[:, None], 0.0)
         a = np.where(moving, p, 0.0)
-        b = np.sum(direction * path.acceleration_rate[:, :2], axis=1)
+        b = np.sum(direction * path.twist_rate[:, :2], axis=1)
         limits = np.tile([self.forward, self.braking], (len(p), 1))
         return linear_rows(
             self.name, np.column_stack([a, -a]), np.column_stack([b, -b]), limits, limits

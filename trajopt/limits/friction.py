@@ -82,15 +82,32 @@ def coefficients(argument: str, friction: Friction, path: PathSamples, robot: Ro
         along = np.interp(path.s, friction.places, friction.values)
         return np.repeat(along[:, None], count, axis=1)
     if isinstance(friction, FrictionMap):
-        points = np.broadcast_to(contact_points(path, robot), (len(path.s), count, 2))
-        world = path.position[:, None, :2] + points @ path.rotation[:, :2, :2].swapaxes(1, 2)
-        return friction.at(world[..., 0], world[..., 1], path.s)
+        return friction.at(*_places(path, robot), path.s)
     values = np.atleast_1d(np.asarray(friction, dtype=np.float64))
     if len(values) not in (1, count):
         raise ArgumentError(argument, friction, f"one value, or {count}: one a wheel of the file")
     return np.broadcast_to(values, (1, count))
 
 
-def edges(friction: Friction) -> tuple[float, ...]:
-    """Path parameters where the coefficient bends, m."""
-    return friction.places if isinstance(friction, FrictionAlong) else ()
+def edges(friction: Friction, path: PathSamples, robot: Robot) -> tuple[float, ...]:
+    """Path parameters where the coefficient bends, m: on a map, where wheels cross its lines."""
+    if isinstance(friction, FrictionAlong):
+        return friction.places
+    if not isinstance(friction, FrictionMap):
+        return ()
+    found = []
+    for place, origin in zip(_places(path, robot), friction.origin, strict=True):
+        cell = (place - origin) / friction.spacing
+        before, after = cell[:-1], cell[1:]
+        line = np.floor(np.maximum(before, after))
+        crossed = np.floor(np.minimum(before, after)) < line
+        share = (line - before)[crossed] / (after - before)[crossed]
+        i = np.nonzero(crossed)[0]
+        found.append(path.s[i] + share * (path.s[i + 1] - path.s[i]))
+    return tuple(np.concatenate(found).tolist())
+
+
+def _places(path: PathSamples, robot: Robot) -> tuple[Array, Array]:
+    """x and y (N, K) of the wheels' contacts in the world, m."""
+    points = contact_points(path, robot) @ path.rotation[:, :2, :2].swapaxes(1, 2)
+    return path.position[:, :1] + points[..., 0], path.position[:, 1:2] + points[..., 1]

@@ -50,15 +50,15 @@ class Slip:
             )
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
-        shares, sizes = [], []
-        for force, grip, size in self._shares(path, require_robot(self.name, robot)):
+        shares, sizes, robot = [], [], require_robot(self.name, robot)
+        for force, grip, size in self._shares(path, robot):
             normals = _normals(self.sides) if force.a.shape[1] == 2 else np.array([[1.0], [-1.0]])
             inside = np.cos(np.pi / self.sides) if force.a.shape[1] == 2 else 1.0
             shares.append(force.through(normals) - grip * inside)
             sizes.append(np.broadcast_to(size * STANDARD_GRAVITY, shares[-1].a.shape))
         found = Affine.beside(*shares)
         rows = linear_rows(self.name, found.a, found.b, -found.c, np.hstack(sizes))
-        return replace(rows, edges=edges(self.friction))
+        return replace(rows, edges=edges(self.friction, path, robot))
 
     def needed(self, path: PathSamples, robot: Robot, sdd: Array, sd2: Array) -> Array:
         """(N,): how many times the friction there is a state s'' and s'^2 (N,) needs, with the cone

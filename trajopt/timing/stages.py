@@ -9,7 +9,7 @@ alone: each interval's are computed once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -118,13 +118,15 @@ def _rows_inside(
     track: Track, left: Array, right: Array, limits: Sequence[Limit]
 ) -> tuple[tuple[Array, ...], Stages]:
     """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,); and the last
-    of the pieces that they were assembled in, which has names, owners and edges."""
+    of the pieces that they were assembled in, which has names, owners, and the edges of all."""
     found: tuple[Array, ...] = ()
+    edges: set[float] = set()
     for first in range(0, len(left), _CHUNK):
         part = slice(first, min(first + _CHUNK, len(left)))
         fine = _fine_grid(left[part], right[part])
         s = track.path.parameter(fine.ravel())
         rows = assemble(track.samples(s, fine.ravel()), limits, track.robot)
+        edges.update(rows.edges)
         s = s.reshape(fine.shape)
         pieces = (
             (s - s[:, :1]) / (s[:, -1:] - s[:, :1]),
@@ -137,7 +139,7 @@ def _rows_inside(
             found = tuple(np.empty((len(left), *piece.shape[1:])) for piece in pieces)
         for target, piece in zip(found, pieces, strict=True):
             target[part] = piece
-    return found, rows
+    return found, replace(rows, edges=tuple(sorted(edges)))
 
 
 def refined(track: Track, fine: FineRows, u: Array, limits: Sequence[Limit]) -> FineRows:
