@@ -31,14 +31,16 @@ def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
     columns |= dict(zip(("vx_m_s", "vy_m_s", "yaw_rate_rad_s"), state.twist.T, strict=True))
     if trajectory.robot is not None:
         steering = steering_of(trajectory.robot)
-        for i, wheel in enumerate(trajectory.robot.description.wheels):
-            own = {}
-            if wheel.kind != "spherical":
-                own = {"angle_rad": state.spin_angles, "speed_rad_s": state.spin_rates}
-            if i in (*steering.steered, *steering.castors):
-                own["steering_rad"] = state.steering_angles
-                own["steering_rate_rad_s"] = state.steering_rates
-            columns |= {column(wheel.name, name): value[:, i] for name, value in own.items()}
+        wheels = trajectory.robot.description.wheels
+        spins = [i for i, wheel in enumerate(wheels) if wheel.kind != "spherical"]
+        turns = sorted((*steering.steered, *steering.castors))
+        for quantity, values, which in (
+            ("angle_rad", state.spin_angles, spins),
+            ("speed_rad_s", state.spin_rates, spins),
+            ("steering_rad", state.steering_angles, turns),
+            ("steering_rate_rad_s", state.steering_rates, turns),
+        ):
+            columns |= {column(wheels[i].name, quantity): values[:, i] for i in which}
     columns |= {"s_m": s, "s_dot_m_s": speed, "s_ddot_m_s2": acceleration}
     columns["limit"] = binding_at(trajectory, times)
     return columns
