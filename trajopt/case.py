@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -133,8 +134,12 @@ class ProblemRun:
 
     @property
     def content(self) -> Any:
-        """The problem in plain values, as identities of cases hold it."""
-        return self.problem.standalone()
+        """The problem in plain values, as identities of cases hold it, with what files of the ground
+        hold by their digests."""
+        folder, files = self.problem.folder, self.problem.ground.files
+        return self.problem.standalone(
+            {key: sha256((folder / file).read_bytes()).hexdigest() for key, file in files.items()}
+        )
 
     def check(self, case: Case, spare: Collection[str]) -> None:
         """Find wrong names now and not in a million rows: ``case`` is the first one, ``spare`` are

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -69,7 +70,7 @@ def solve(
                 (optimizer, budget, x0),
                 "none: a given path is not searched",
             )
-        found = _timed(problem, problem.path, engine)
+        found = _timed(problem, problem.flat_path, engine)
     else:
         objective = search_objective(problem)
         if optimizer == "auto" and not problem.critical and problem.actuator is None:
@@ -100,36 +101,30 @@ def _timed(
     problem: Problem, path: Path, engine: str, searched: OptimizeResult | None = None
 ) -> Solution:
     """The solution on a path; without a trajectory where no motion keeps the limits."""
-    limits, robot, ground = problem.limits, problem.robot, problem.scene.ground
-    wheels = problem.start_wheels
+    limits = problem.limits
+    around: dict[str, Any] = {
+        "robot": problem.robot,
+        "ground": problem.scene.ground,
+        "start_wheels": problem.start_wheels,
+        "start_steering": problem.start_steering,
+    }
     try:
         if problem.actuator is not None and searched is not None:
             if engine != "auto":
                 raise ArgumentError("engine", engine, "auto with [actuator]: nothing is scaled")
             terminal = terminal_objective(problem)
             duration = float(terminal.control_points(searched.x[:, None]).duration[0, 0])
-            timed = nominal_timing(
-                path, duration, limits, robot=robot, ground=ground, start_wheels=wheels
-            )
+            timed = nominal_timing(path, duration, limits, **around)
         elif problem.profile is not None:
             if engine != "auto":
                 raise ArgumentError("engine", engine, "auto with [profile]")
-            timed = follow(
-                path,
-                problem.profile.bound,
-                limits,
-                robot=robot,
-                ground=ground,
-                start_wheels=wheels,
-                manner=problem.profile.manner,
-            ).trajectory
+            bound, manner = problem.profile.bound, problem.profile.manner
+            timed = follow(path, bound, limits, manner=manner, **around).trajectory
         else:
-            timed = time_scale(
-                path, limits, robot=robot, ground=ground, start_wheels=wheels, engine=engine
-            )
+            timed = time_scale(path, limits, engine=engine, **around)
     except InfeasibleError as error:
         return Solution(problem, path, None, error, searched)
-    return Solution(problem, path, timed, None, searched)
+    return Solution(problem, timed.path, timed, None, searched)
 
 
 def validate(

@@ -18,7 +18,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from trajopt.errors import ProblemError
@@ -48,6 +48,17 @@ def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
     return PydanticCustomError(
         "trajopt_rule", "{expected}", {"key": key, "given": value, "expected": expected}
     )
+
+
+def _one_or_each(value: Any, read: Any) -> Any:
+    """Errors of a union would name its members; strictly, a list is no tuple."""
+    try:
+        return read(tuple(value) if isinstance(value, list) else value)
+    except ValidationError:
+        raise broken_rule("", value, "a number > 0, or an array of them") from None
+
+
+OneOrEach = Annotated[Positive | tuple[Positive, ...], WrapValidator(_one_or_each)]
 
 
 def as_problem_error(error: PydanticCustomError, file: str) -> ProblemError:

@@ -38,7 +38,7 @@ def following_in_physics() -> ResultTable:
             manner="below" if manner == "below" else "least_squares",
         )
         for loop, tracker in (("open", None), ("closed", Tracker())):
-            scene = Scene(task.ground.friction, Flat())
+            scene = Scene(task.scene.friction, Flat())
             seen = drive_plan(plan.trajectory, scene, tracker=tracker)
             run = seen.recording
             moving = run.times <= plan.trajectory.duration

@@ -130,7 +130,7 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
         seen = drive_encounter(
             where,
             robot,
-            Scene(task.ground.friction, Flat()),
+            Scene(task.scene.friction, Flat()),
             sensor,
             visitors,
             longest=300.0,

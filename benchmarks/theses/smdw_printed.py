@@ -118,7 +118,7 @@ def printed_climb(
         * spin
     )
     pose = (float(row["xf_m"]), float(row["yf_m"]), float(row["psif_rad"]))
-    scene = step_scene(problem, problem.ground.friction)
+    scene = step_scene(problem, problem.scene.friction)
     room = scene.step.place[0] - pose[0]
     return Climb(
         replace(scene, step=replace(scene.step, height=height)),

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, get_args
 
 import numpy as np
@@ -22,7 +24,7 @@ from trajopt.problem import Problem, load_problem
 from trajopt.problem.extensions import SECTIONS, entry
 from trajopt.report.path_picture import path_figure
 from trajopt.robots.robot import DATA
-from trajopt.schema import _models
+from trajopt.schema import _models, validated
 from trajopt.solution import Solution
 
 EXEMPT = {"title", "robot.about"}  # for people
@@ -45,6 +47,12 @@ STRAIGHT: dict[str, Any] = {
 }  # fmt: skip
 DRIVES = {"actuator": {"duration": 2.5, "saturation": 20.0, "dead_zone": 1.0}}
 FREE = {"path.heading": "free", "path.headings": [0.0, 0.2, 0.0], "robot": {"name": "loc8"}}
+CAR = {
+    "robot": {"name": "car"},
+    "path.points": [[0.0, 0.0], [1.5, 0.0], [3.0, 0.4], [4.5, 0.4]],
+    "limits.speed_zones": [{"start": 1.0, "end": 2.0, "speed": 0.5}],
+    "obstacles": None,
+}
 PROFILE = {"profile": {"places": [0.0, 1.5], "speeds": [0.3, 0.4]}}
 
 
@@ -60,9 +68,52 @@ def bases() -> dict[str, Problem]:
         "free": straight.replace(FREE),
         "profile": straight.replace(PROFILE),
         "climb": load_problem(PROBLEMS / "smdw" / "step_5cm.toml"),
+        "car": straight.replace(CAR),
+        "icy": on_ground(straight, friction_along={"places": [0.0, 1.5], "values": [0.3, 0.02]}),
+        "spots": on_ground(
+            straight, friction_map={"file": "spots.npy", "spacing": 1.0, "origin": [-2.0, -2.0]}
+        ),
+        "plane": on_ground(straight, plane={"slope": 0.05, "direction": 0.3}, friction=0.3),
+        "map": on_ground(
+            straight,
+            height_map={"file": "heights.npy", "spacing": 1.0, "origin": [-2.0, -2.0]},
+            **HILLY,
+        ),
+        "mesh": on_ground(straight, mesh={"file": "heights.stl", "spacing": 0.5}, **HILLY),
+        "rough": on_ground(
+            straight,
+            rough={"sigma": 0.02, "correlation": 1.0, "size": 8.0, "spacing": 0.2, "seed": 5},
+            **HILLY,
+        ),
         "ramp": load_problem(PROBLEMS / "powerbot" / "experiment_4.toml"),
         "encounters": load_problem(PROBLEMS / "powerbot" / "experiment_3.toml"),
     }
+
+
+HILLY = {"friction": 0.3, "grade": 1.0}
+
+
+@cache
+def folder() -> Path:
+    """A folder with files of heights and frictions."""
+    place = Path(mkdtemp())
+    y, x = np.mgrid[-2.0:4.0, -2.0:4.0]
+    for name, height in (("heights", 0.05 * np.sin(x) + 0.03 * y), ("other", 0.2 + 0.02 * y * x)):
+        np.save(place / f"{name}.npy", height)
+        lines = ["solid"]
+        for i, j in np.ndindex(5, 5):
+            for corners in (((0, 0), (0, 1), (1, 1)), ((0, 0), (1, 1), (1, 0))):
+                at = [(i + a, j + b) for a, b in corners]
+                lines += [f"vertex {x[c]} {y[c]} {height[c]}" for c in at]
+        (place / f"{name}.stl").write_text("\n".join(lines), encoding="utf-8")
+    np.save(place / "spots.npy", 0.02 + 0.02 * np.abs(np.cos(x)) + 0.01 * (y + 2))
+    return place
+
+
+def on_ground(problem: Problem, **ground: Any) -> Problem:
+    """The problem on another ground, as of a file in the folder."""
+    tables = problem.replace({"obstacles": None}).tables()
+    return validated(Problem, {**tables, "ground": ground}, str(folder() / "p.toml"))
 
 
 def motion(s: Solution) -> Any:
@@ -70,7 +121,7 @@ def motion(s: Solution) -> Any:
     if s.trajectory is None:
         return s.faults
     state = s.trajectory.at(np.linspace(0.0, s.trajectory.duration, 9))
-    return s.duration, state.pose.tolist(), state.wheel_angles.tolist()
+    return s.duration, state.pose.tolist(), state.spin_angles.tolist()
 
 
 def told(s: Solution) -> Any:
@@ -119,11 +170,32 @@ ROWS = {
     "robot.steering": Row("search", [0.0, 1.0], "robot.steering", "robot.steering.none.range"),
     "robot.skid": Row("search", 0.5, "only with fixed wheels", "robot.skid.effective_track"),
     "ground.friction": Row("path", 0.03, motion),
+    "ground.friction_along.places": Row("icy", [0.0, 1.0], motion),
+    "ground.friction_along.values": Row("icy", [0.3, 0.04], motion),
+    "ground.friction_map.file": Row("spots", "other.npy", motion),
+    "ground.friction_map.spacing": Row("spots", 1.5, motion),
+    "ground.friction_map.origin": Row("spots", [-2.0, -2.5], motion),
+    "ground.friction_map.white": Row("spots", 1.0, "none: spots.npy holds"),
+    "ground.plane.slope": Row("plane", 0.1, motion),
+    "ground.plane.direction": Row("plane", 1.0, motion),
+    "ground.height_map.file": Row("map", "other.npy", motion),
+    "ground.height_map.spacing": Row("map", 1.2, motion),
+    "ground.height_map.origin": Row("map", [-2.3, -2.0], motion),
+    "ground.height_map.relief": Row("map", 1.0, "none: heights.npy holds"),
+    "ground.mesh.file": Row("mesh", "other.stl", motion),
+    "ground.mesh.spacing": Row("mesh", 0.4, motion),
+    "ground.rough.sigma": Row("rough", 0.01, motion),
+    "ground.rough.correlation": Row("rough", 1.5, motion),
+    "ground.rough.size": Row("rough", 9.0, motion),
+    "ground.rough.spacing": Row("rough", 0.25, motion),
+    "ground.rough.flat_radius": Row("rough", 1.5, motion),
+    "ground.rough.seed": Row("rough", 6, motion),
     "ground.ramps.foot": Row("ramp", [-44.63, -31.0], motion, "ground.ramps.0.foot"),
     "ground.ramps.direction": Row("ramp", -1.5, motion, "ground.ramps.0.direction"),
     "ground.ramps.length": Row("ramp", 4.0, motion, "ground.ramps.0.length"),
     "ground.ramps.height": Row("ramp", 0.3, motion, "ground.ramps.0.height"),
     "ground.ramps.rounding": Row("ramp", 0.6, motion, "ground.ramps.0.rounding"),
+    "ground.ramps.edge": Row("ramp", "smooth", motion, "ground.ramps.0.edge"),
     "ground.grade": Row("ramp", 0.05, told),
     "obstacles.step.name": Row("path", "kerb", told, "obstacles.block.name"),
     "obstacles.step.kind": Row("path", "hole", "obstacles", "obstacles.block.kind"),
@@ -154,14 +226,21 @@ ROWS = {
     "limits.yaw_rate": Row("path", 0.05, motion),
     "limits.wheel_speed": Row("search", [9.0, 9.0, 5.0, 9.0], motion),
     "limits.wheel_acceleration": Row("search", [9.0, 9.0, 5.0, 9.0], motion),
+    "limits.steering_rate": Row("car", 0.02, motion),
+    "limits.steering_acceleration": Row("car", 0.02, motion),
+    "limits.speed_zones.start": Row("car", 0.5, motion, "limits.speed_zones.0.start"),
+    "limits.speed_zones.end": Row("car", 2.5, motion, "limits.speed_zones.0.end"),
+    "limits.speed_zones.speed": Row("car", 0.4, motion, "limits.speed_zones.0.speed"),
     "limits.slip": Row("path", False, margins),
     "limits.slip_share": Row("path", 0.1, motion),
     "limits.acceleration": Row("path", 0.3, motion),
     "limits.deceleration": Row("path", 0.3, motion),
     "limits.tip": Row("path", False, margins),
+    "limits.contact": Row("path", 0.1, margins),
     "limits.variant": Row("path", "thesis", margins),
     "start.pose": Row("search", [0.1, 0.0, 0.0], motion),
     "start.wheels": Row("search", [0.1, 0.2, 0.3, 0.4], motion),
+    "start.steering": Row("path", {"castor-left": 1.0}, motion),
     "goal.pose": Row("search", [2.4, 0.76, -1.5], motion),
     "goal.wheels": Row("search", [0.5, 0.0, 0.0, 0.0], motion),
     "goal.critical": Row("search", ["front-right"], motion),

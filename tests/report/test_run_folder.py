@@ -21,12 +21,10 @@ from trajopt.errors import ArgumentError, MissingDependencyError, ProblemError
 from trajopt.optimize.search import optimizer_names
 from trajopt.provenance import commit, versions
 from trajopt.report.files import as_toml, finite
+from trajopt.report.motion import binding_at, binding_shares, trajectory_table
 from trajopt.report.run_folder import (
-    binding_at,
-    binding_shares,
     read_solution,
     solution_summary,
-    trajectory_table,
     write_solution,
     write_validation,
 )
@@ -172,6 +170,9 @@ def test_columns_of_the_trajectory_have_units(exact: Solution, tmp_path: Path) -
         "x_m",
         "y_m",
         "yaw_rad",
+        "z_m",
+        "roll_rad",
+        "pitch_rad",
         "vx_m_s",
         "vy_m_s",
         "yaw_rate_rad_s",

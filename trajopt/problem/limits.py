@@ -7,18 +7,37 @@ from typing import Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from trajopt.arrays import Array
 from trajopt.limits.acceleration import Acceleration
+from trajopt.limits.contact import Contact
+from trajopt.limits.friction import Friction
 from trajopt.limits.limit import Limit
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
+from trajopt.limits.speed_bound import SpeedZones
+from trajopt.limits.steering_acceleration import SteeringAcceleration
+from trajopt.limits.steering_rate import SteeringRate
 from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
+from trajopt.problem.ground import scaled
 from trajopt.robots.robot import Robot
-from trajopt.schema import Positive, Section, Share, broken_rule
+from trajopt.schema import NonNegative, OneOrEach, Positive, Section, Share, broken_rule
 
-EachWheel = Positive | tuple[Positive, ...]
+
+class SpeedZoneSection(Section):
+    """A stretch of the path with a speed of its own."""
+
+    start: NonNegative = Field(description="path parameter, m")
+    end: Positive = Field(description="path parameter, m")
+    speed: Positive = Field(description="m/s")
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.start < self.end:
+            raise broken_rule("end", self.end, f"a place after start = {self.start} m")
+        return self
 
 
 class LimitsSection(Section):
@@ -27,12 +46,19 @@ class LimitsSection(Section):
     speed: Positive | None = Field(None, description="translational speed, m/s")
     safety_speed: Positive | None = Field(None, description="to stop for obstacles, m/s")
     yaw_rate: Positive | None = Field(None, description="rad/s")
-    wheel_speed: EachWheel | None = Field(
+    wheel_speed: OneOrEach | None = Field(
         None, description="one, or one a wheel that rolls, rad/s; motors bound it too"
     )
-    wheel_acceleration: EachWheel | None = Field(
+    wheel_acceleration: OneOrEach | None = Field(
         None, description="one, or one a wheel that rolls, rad/s^2; motors bound it too"
     )
+    steering_rate: OneOrEach | None = Field(
+        None, description="one, or one a [[steering]] of the robot, rad/s; its own bounds it too"
+    )
+    steering_acceleration: OneOrEach | None = Field(
+        None, description="one, or one a [[steering]] of the robot, rad/s^2; its own bounds it too"
+    )
+    speed_zones: tuple[SpeedZoneSection, ...] = Field((), description="of a given path")
     slip: bool = Field(False, description="stay within the ground's friction")
     slip_share: Share | None = Field(
         None, description="use only this share of the friction, with slip; absent: all of it"
@@ -41,7 +67,13 @@ class LimitsSection(Section):
     deceleration: Positive | None = Field(
         None, description="braking along the motion, m/s^2, positive"
     )
-    tip: bool = Field(False, description="keep every wheel on the ground")
+    tip: bool = Field(False, description="keep the robot from tipping over")
+    contact: float | None = Field(
+        None,
+        description="least load on every wheel, as a share of an even one; 0: none lifts",
+        ge=0,
+        lt=1,
+    )
     variant: str | None = Field(
         None, description="other formulas for slip and tip, by name: thesis (004)"
     )
@@ -60,7 +92,7 @@ class LimitsSection(Section):
             raise broken_rule("variant", self.variant, "slip or tip, whose formulas it changes")
         return self
 
-    def limits(self, robot: Robot, friction: float) -> tuple[Limit, ...]:
+    def limits(self, robot: Robot, friction: Friction) -> tuple[Limit, ...]:
         """The limits that are given, as time scaling takes them, without a variant's."""
         found: list[Limit] = []
         if self.speed is not None:
@@ -75,29 +107,60 @@ class LimitsSection(Section):
         rate = each_wheel(self.wheel_acceleration, robot, "acceleration")
         if rate is not None:
             found.append(WheelAcceleration(rate))
+        turn = each_steering(self.steering_rate, robot, "rate")
+        if turn is not None:
+            found.append(SteeringRate(turn))
+        bend = each_steering(self.steering_acceleration, robot, "acceleration")
+        if bend is not None:
+            found.append(SteeringAcceleration(bend))
+        if self.speed_zones:
+            zones = tuple((zone.start, zone.end, zone.speed) for zone in self.speed_zones)
+            found.append(SpeedZones(zones))
         if self.slip and self.variant is None:
-            found.append(Slip(self.friction(friction)))
+            found.append(Slip(scaled(friction, self.share)))
         if self.acceleration is not None and self.deceleration is not None:
             found.append(Acceleration(self.acceleration, self.deceleration))
         if self.tip and self.variant is None:
             found.append(Tip())
+        if self.contact is not None:
+            found.append(Contact(self.contact))
         return tuple(found)
 
-    def friction(self, friction: float) -> float:
-        """The coefficient that the slip limit may use."""
-        return friction * (1.0 if self.slip_share is None else self.slip_share)
+    @property
+    def share(self) -> float:
+        """Of the friction, that the slip limit may use."""
+        return 1.0 if self.slip_share is None else self.slip_share
 
 
 def each_wheel(
     asked: float | tuple[float, ...] | None, robot: Robot, motors: str
 ) -> float | tuple[float, ...] | None:
-    """The lesser of what is asked and what the motors can do: one number where all are equal, None
-    where nothing bounds. Raises the broken rule for another number of values than wheels."""
-    count = len(robot.wheels)
-    if isinstance(asked, tuple) and len(asked) != count:
-        expected = f"one value, or {count}: one a wheel ({', '.join(robot.wheel_names)})"
-        raise broken_rule(f"limits.wheel_{motors}", list(asked), expected)
-    bound = np.minimum(np.inf if asked is None else asked, robot.motor_array(motors))
+    """The lesser of what is asked and what the motors can do, None where nothing bounds."""
+    names = robot.wheel_names
+    return _lesser(f"wheel_{motors}", asked, robot.motor_array(motors), names, "a wheel")
+
+
+def each_steering(
+    asked: float | tuple[float, ...] | None, robot: Robot, key: str
+) -> float | tuple[float, ...] | None:
+    """The lesser of what is asked and the ``key`` of every [[steering]], None where nothing
+    bounds."""
+    groups = robot.description.steering
+    if asked is not None and not groups:
+        raise broken_rule(f"limits.steering_{key}", asked, f"none: '{robot.name}' does not steer")
+    own = np.array([getattr(group, key) or np.inf for group in groups])
+    names = tuple(group.name for group in groups)
+    return _lesser(f"steering_{key}", asked, own, names, "a [[steering]]")
+
+
+def _lesser(
+    key: str, asked: float | tuple[float, ...] | None, own: Array, names: tuple[str, ...], each: str
+) -> float | tuple[float, ...] | None:
+    """One number where all are equal. Raises the broken rule for another number of values."""
+    if isinstance(asked, tuple) and len(asked) != len(own):
+        expected = f"one value, or {len(own)}: one {each} ({', '.join(names)})"
+        raise broken_rule(f"limits.{key}", list(asked), expected)
+    bound = np.minimum(np.inf if asked is None else asked, own)
     if not np.isfinite(bound).any():
         return None
     values = tuple(bound.tolist())

@@ -6,7 +6,6 @@ counter-clockwise). Per-wheel arrays are over ``robot.wheel_names``.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,18 +18,21 @@ from pydantic_core import PydanticCustomError
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
+from trajopt.limits.friction import Friction
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
-from trajopt.problem.extensions import SECTIONS, Climb, Encounters, Printed, entry, variant_entry
+from trajopt.problem.checks import check
+from trajopt.problem.extensions import Climb, Encounters, Printed, variant_entry
 from trajopt.problem.given import PathSection, ProfileSection, inlined
+from trajopt.problem.ground import GroundSection, least
 from trajopt.problem.jobs import Job, job_of
 from trajopt.problem.limits import LimitsSection
 from trajopt.problem.robot import RobotSection, robot_of, robot_tables
-from trajopt.problem.surroundings import GroundSection, ObstacleSection, scene_of
+from trajopt.problem.surroundings import ObstacleSection
 from trajopt.problem.task import ActuatorSection, Goal, ObjectiveSection, Space, Spline, Start
 from trajopt.robots.robot import Robot
 from trajopt.schema import Point3, Section, as_problem_error, broken_rule, set_key, validated
-from trajopt.world.ramp import lay_over
+from trajopt.world.laid import lay
 from trajopt.world.scene import Scene
 
 
@@ -78,16 +80,7 @@ class Problem(Section):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         _ = self.job, self.robot, self.scene
-        if not self.limits:
-            raise broken_rule("limits", {}, "at least one limit")
-        self._check_wheels()
-        if self.job.name == "search":
-            self._check_search()
-        if self.job.name == "path":
-            self._check_path()
-        for section in self.given & set(SECTIONS):
-            if hasattr(entry(section), "check"):
-                entry(section).check(self)
+        check(self)
         return self
 
     def __eq__(self, other: object) -> bool:
@@ -127,16 +120,23 @@ class Problem(Section):
     @cached_property
     def scene(self) -> Scene:
         """Where it moves."""
+        standing = tuple(section.obstacle for section in self.obstacles)
+        friction, ground = self.friction, self.ground.shape(self.folder)
         try:
-            return scene_of(self.ground, self.obstacles)
+            return Scene(least(friction), ground, standing, not isinstance(friction, float))
         except ArgumentError as error:
             raise broken_rule("obstacles.name", error.value, error.expected) from None
+
+    @cached_property
+    def friction(self) -> Friction:
+        """Between wheels and ground."""
+        return self.ground.coefficient(self.folder)
 
     @cached_property
     def limits(self) -> tuple[Limit, ...]:
         """What it keeps, the motors' limits included."""
         asked = self.limits_section
-        found = asked.limits(self.robot, self.ground.friction)
+        found = asked.limits(self.robot, self.friction)
         if asked.variant is not None:
             found += tuple(variant_entry(asked.variant).variant_limits(self))
         return found
@@ -150,9 +150,10 @@ class Problem(Section):
 
     @cached_property
     def path(self) -> Path:
-        """The given path, over the ramps where there are some."""
-        ramps = [ramp.ramp for ramp in self.ground.ramps]
-        return lay_over(self.flat_path, ramps) if ramps else self.flat_path
+        """The given path, laid on the ground. Raises InfeasibleError where it cannot be driven
+        there."""
+        ground = self.scene.ground
+        return self.flat_path if ground.level else lay(self.flat_path, ground)
 
     @cached_property
     def search(self) -> Search:
@@ -170,6 +171,11 @@ class Problem(Section):
         """(W,): wheel angles at the start, rad."""
         wheels = None if self.start is None else self.start.wheels
         return np.zeros(len(self.robot.wheels)) if wheels is None else np.array(wheels)
+
+    @property
+    def start_steering(self) -> dict[str, float]:
+        """Steering and castor angles at the start that are given, rad, by wheel."""
+        return {} if self.start is None or self.start.steering is None else self.start.steering
 
     @property
     def critical(self) -> tuple[str, ...]:
@@ -190,9 +196,12 @@ class Problem(Section):
             del tables["objective"]
         return tables
 
-    def standalone(self) -> dict[str, Any]:
-        """The tables of a file that needs no other file of the user's."""
+    def standalone(self, ground_files: Mapping[str, str] | None = None) -> dict[str, Any]:
+        """The tables of a file that needs no other file of the user's, but for the ground's:
+        ``ground_files`` are new names of these, by the key of their table."""
         tables = self.tables()
+        for key, file in (ground_files or {}).items():
+            tables["ground"][key]["file"] = file
         if self.robot_section.file is not None:
             tables["robot"] = robot_tables(tables["robot"], self.folder)
         if self.path_section is not None:
@@ -216,86 +225,6 @@ class Problem(Section):
             else:
                 change_key(data, name, value, self.source)
         return validated(Problem, data, self.source)
-
-    # -- checks ------------------------------------------------------------------------------------
-
-    def _check_wheels(self) -> None:
-        names = self.robot.wheel_names
-        for section in ("start", "goal"):
-            wheels = getattr(getattr(self, section), "wheels", None)
-            if wheels is not None and len(wheels) != len(names):
-                expected = f"{len(names)} angles, one a wheel that rolls ({', '.join(names)})"
-                raise broken_rule(f"{section}.wheels", list(wheels), expected)
-        for name in self.critical:
-            if name not in names:
-                raise broken_rule("goal.critical", name, "wheels among " + ", ".join(names))
-        # With pose and heading given a path chooses two numbers: the body's displacement along its
-        # own axes, summed on the way. Wheels whose rows are dependent turn together.
-        rows = self.robot.inverse[list(self.critical_indices), :2]
-        if np.linalg.matrix_rank(rows, tol=1e-9 * np.abs(self.robot.inverse).max()) < len(rows):
-            expected = (
-                "wheels that turn independently of one another: at most two, whose rolling rows "
-                "differ (with four Mecanum wheels not two that are diagonally opposite)"
-            )
-            raise broken_rule("goal.critical", list(self.critical), expected)
-
-    def _check_search(self) -> None:
-        if self.start is not None and self.start.pose is None:
-            raise broken_rule("start.pose", None, "x, y, yaw of the start")
-        task = self.search
-        space = task.space
-        others = [wheel.name for wheel in self.robot.rolling if wheel.kind != "swedish"]
-        if others or not self.robot.holonomic:
-            expected = (
-                "a robot whose rolling wheels are all Swedish and that moves in every direction, "
-                f"for a searched spline; '{self.robot.name}' has {', '.join(others) or 'too few'}; "
-                "others can be given their [path]"
-            )
-            raise broken_rule("robot.name", self.robot.name, expected)
-        for name, pose in (("start", task.start), ("goal", task.goal)):
-            if not space.contains(pose[0], pose[1]):
-                expected = f"a position inside space x {list(space.x)}, y {list(space.y)}"
-                raise broken_rule(f"{name}.pose", list(pose), expected)
-        if math.dist(task.start[:2], task.goal[:2]) < 1e-6:
-            raise broken_rule("goal.pose", list(task.goal), "a position different from start.pose")
-        if self.ground.ramps:
-            expected = "none: a searched spline has a heading of its own, which needs level ground"
-            raise broken_rule("ground.ramps", len(self.ground.ramps), expected)
-        kind = self.objective.kind
-        if kind == "terminal" and not self.critical and self.actuator is None:
-            expected = (
-                '"duration": without goal.critical every path ends at the goal, and the terminal '
-                "cost is always 0"
-            )
-            raise broken_rule("objective.kind", kind, expected)
-        if kind == "duration" and self.actuator is not None:
-            expected = (
-                'none with objective.kind = "duration": a time-scaled motion keeps wheel speeds '
-                "within limits, so no drive saturates"
-            )
-            raise broken_rule("actuator", "given", expected)
-        if "duration" in task.free and self.actuator is None:
-            expected = (
-                "no duration without [actuator]: drives that follow end at the same angles "
-                "whatever the duration, and time scaling chooses it"
-            )
-            raise broken_rule("spline.free", list(task.free), expected)
-
-    def _check_path(self) -> None:
-        if self.start is not None and self.start.pose is not None:
-            expected = "none: the path starts at its first point"
-            raise broken_rule("start.pose", list(self.start.pose), expected)
-        assert self.path_section is not None
-        if self.path_section.heading == "free" and not self.robot.holonomic:
-            expected = f"\"along\": '{self.robot.name}' cannot move in every direction"
-            raise broken_rule("path.heading", "free", expected)
-        try:
-            length = self.path.length
-        except ArgumentError as error:
-            raise broken_rule(f"path.{error.argument}", error.value, error.expected) from None
-        if self.profile is not None and self.profile.places[-1] > length * (1 + 1e-6):
-            expected = f"path parameters up to the path's length, {length:.6g} m"
-            raise broken_rule("profile.places", list(self.profile.places), expected)
 
 
 def change_key(data: dict[str, Any], dotted: str, value: Any, file: str) -> None:

@@ -1,4 +1,4 @@
-"""Where the robot drives: ground and obstacles."""
+"""What stands on the ground."""
 
 from __future__ import annotations
 
@@ -8,53 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from trajopt.schema import Point, Positive, Section, broken_rule
-from trajopt.world.obstacles import Circle, Obstacle, Polygon, Step, Wall
-from trajopt.world.ramp import Ramp, Ramps
-from trajopt.world.scene import Scene
-from trajopt.world.terrain import Flat
-
-
-class RampSection(Section):
-    """A ramp on the floor."""
-
-    foot: Point = Field(description="a point of the foot line, x, y, m")
-    direction: float = Field(description="in which it rises, rad")
-    length: Positive = Field(description="along the slope, m")
-    height: float = Field(description="m")
-    rounding: Positive = Field(description="edges are rounded over this length, m (axle distance)")
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        if not abs(self.height) < self.length:
-            raise broken_rule("height", self.height, f"a height below the length {self.length} m")
-        return self
-
-    @property
-    def ramp(self) -> Ramp:
-        run = math.sqrt(self.length**2 - self.height**2)
-        return Ramp(self.foot, self.direction, run, self.height, self.rounding)
-
-
-class GroundSection(Section):
-    """The ground: its friction and shape (level where there are no ramps)."""
-
-    friction: Positive = Field(description="coefficient between wheels and ground")
-    ramps: tuple[RampSection, ...] = Field((), description="ramps on level ground")
-    grade: float | None = Field(
-        None, description="steepest slope that the robot climbs, rad; with ramps", gt=0, lt=1.57
-    )
-
-    @model_validator(mode="after")
-    def _both(self) -> Self:
-        if bool(self.ramps) != (self.grade is not None):
-            raise broken_rule("grade", self.grade, "ramps and grade both given or both left out")
-        return self
-
-    @property
-    def shape(self) -> Flat | Ramps:
-        if self.grade is None:
-            return Flat()
-        return Ramps(tuple(ramp.ramp for ramp in self.ramps), self.grade)
+from trajopt.world.obstacles import Circle, Polygon, Step, Wall
 
 
 class _Standing(Section):
@@ -133,9 +87,3 @@ class PolygonSection(_Standing):
 ObstacleSection = Annotated[
     StepSection | WallSection | CircleSection | PolygonSection, Field(discriminator="kind")
 ]
-
-
-def scene_of(ground: GroundSection, obstacles: tuple[ObstacleSection, ...]) -> Scene:
-    """The scene that physics and checks drive in. Raises ArgumentError for equal names."""
-    standing: list[Obstacle] = [section.obstacle for section in obstacles]
-    return Scene(ground.friction, ground.shape, tuple(standing))

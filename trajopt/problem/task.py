@@ -22,6 +22,11 @@ class Start(Section):
     wheels: tuple[float, ...] | None = Field(
         None, description="wheel angles, one a wheel that rolls, rad; absent: zeros"
     )
+    steering: dict[str, float] | None = Field(
+        None,
+        description="steering and castor angles by wheel, rad; absent: castors as the robot's file "
+        "draws them, steered wheels as the path begins",
+    )
 
 
 class Goal(Section):

@@ -13,9 +13,14 @@ from trajopt.files import whole_file
 
 
 def write_text(file: FilePath, text: str) -> None:
+    """As ``write_bytes``, in UTF-8."""
+    write_bytes(file, text.encode("utf-8"))
+
+
+def write_bytes(file: FilePath, content: bytes) -> None:
     """Write under a temporary name in the same folder, then rename."""
     with whole_file(file) as part:
-        part.write_text(text, encoding="utf-8", newline="\n")
+        part.write_bytes(content)
 
 
 def write_json(file: FilePath, content: dict[str, Any]) -> None:

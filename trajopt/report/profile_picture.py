@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from trajopt.arrays import Array
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.samples import sample_at
-from trajopt.report.run_folder import binding_shares
+from trajopt.report.motion import binding_shares
 from trajopt.report.style import (
     BLACK,
     BLUE,

@@ -1,7 +1,8 @@
 """The folder of one run: what was asked, what was found, and enough to go on from it.
 
 ``problem.toml`` the problem as solved; ``summary.json`` the result in numbers; ``trajectory.csv``
-the motion over time; ``timing.csv`` the exact speed profile; ``history.csv`` and ``explored.npz``
+the motion over time; ``timing.csv`` the exact speed profile; ``height_map``, ``mesh`` and
+``friction_map`` files of the ground; ``history.csv`` and ``explored.npz``
 the search, where control points were searched; ``validation.json`` and ``simulated.csv`` the check
 in physics. It stands alone: robot and path are in problem.toml, and reading it back gives problem,
 path and trajectory to the last bit.
@@ -30,10 +31,12 @@ from trajopt.report.files import (
     as_toml,
     made_folder,
     read_json,
+    write_bytes,
     write_json,
     write_table,
     write_text,
 )
+from trajopt.report.motion import binding_shares, timing_table, trajectory_table, wheel_columns
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
 from trajopt.timing.trajectory import Trajectory
@@ -43,7 +46,6 @@ if TYPE_CHECKING:
 
 
 FORMAT = 2  # of the folder; a reader of another number refuses
-SAMPLE_TIME = 0.01  # s, largest step of trajectory.csv; chosen: 100 rows a second
 _OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png")
 _OF_A_SOLUTION = (
     "summary.json",
@@ -74,16 +76,22 @@ def write_solution(
     trajectory.csv and timing.csv. ``pictures`` draws them too. Raises ArgumentError where the
     folder cannot be written.
     """
-    place, search = made_folder(folder), solution.search
+    place, search, problem = made_folder(folder), solution.search, solution.problem
+    # Read first: the problem's file may stand in this folder itself.
+    ground = {key: problem.folder / file for key, file in problem.ground.files.items()}
+    stored = {key: (f"{key}{file.suffix}", file.read_bytes()) for key, file in ground.items()}
     for name in (
         *_OF_A_SOLUTION,
         *_OF_A_CHECK,
     ):  # nothing of an earlier run may pass for this one's
         (place / name).unlink(missing_ok=True)
-    write_text(place / "problem.toml", as_toml(solution.problem.standalone()))
+    for name, content in stored.values():
+        write_bytes(place / name, content)
+    names = {key: name for key, (name, _) in stored.items()}
+    write_text(place / "problem.toml", as_toml(problem.standalone(names)))
     if solution.trajectory is not None:
         write_table(place / "trajectory.csv", trajectory_table(solution.trajectory))
-        write_table(place / "timing.csv", _timing_table(solution.trajectory))
+        write_table(place / "timing.csv", timing_table(solution.trajectory))
     if search is not None:
         write_table(place / "history.csv", _history_table(search.history))
         _write_samples(search.history.samples, place / "explored.npz")
@@ -189,10 +197,11 @@ def read_solution(folder: str | FilePath) -> Solution:
     problem = load_problem(place / "problem.toml")
     try:
         search = None if summary["search"] is None else _search(summary, place, problem)
-        path = problem.path if problem.job.name == "path" else None
+        timing, path = summary["timing"], None
+        if problem.job.name == "path":
+            path = problem.flat_path if timing is None else problem.path
         if search is not None:
             path = terminal_objective(problem).path(search.x)
-        timing = summary["timing"]
         trajectory = None
         if timing is not None and path is not None:
             trajectory = _trajectory(place, path, problem, timing)
@@ -276,66 +285,12 @@ def validation_summary(report: ValidationReport, robot: Robot) -> dict[str, Any]
     }
 
 
-def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
-    """The motion in equal steps of at most 10 ms, a column a name; units in the names.
-
-    Pose in the world; speeds in the body frame; wheel angles from the trajectory's ``start_wheels``
-    on; ``limit`` names what binds ("" for nothing).
-    """
-    count = max(2, int(np.ceil(trajectory.duration / SAMPLE_TIME)) + 1)
-    times = np.linspace(0.0, trajectory.duration, count)
-    state, (s, speed, acceleration) = trajectory.at(times), trajectory.along(times)
-    columns: dict[str, Any] = {"t_s": times}
-    columns |= dict(zip(("x_m", "y_m", "yaw_rad"), state.pose.T, strict=True))
-    columns |= dict(zip(("vx_m_s", "vy_m_s", "yaw_rate_rad_s"), state.twist.T, strict=True))
-    if trajectory.robot is not None:
-        columns |= wheel_columns("angle_rad", state.wheel_angles, trajectory.robot)
-        columns |= wheel_columns("speed_rad_s", state.wheel_speeds, trajectory.robot)
-    columns |= {"s_m": s, "s_dot_m_s": speed, "s_ddot_m_s2": acceleration}
-    columns["limit"] = binding_at(trajectory, times)
-    return columns
-
-
-def binding_at(trajectory: Trajectory, times: Array) -> list[str]:
-    """Name of the limit that binds at each time (s), "" where none does."""
-    interval = np.clip(
-        np.searchsorted(trajectory.times, times, side="right") - 1, 0, len(trajectory.sdd) - 1
-    )
-    return [trajectory.binding[i] for i in interval]
-
-
-def binding_shares(trajectory: Trajectory) -> dict[str, float]:
-    """Share of the duration in which each limit binds, most first; "" for the rest is left out."""
-    steps, names = np.diff(trajectory.times) / trajectory.duration, np.array(trajectory.binding)
-    shares = {limit.name: float(steps[names == limit.name].sum()) for limit in trajectory.limits}
-    return dict(sorted(((k, v) for k, v in shares.items() if v > 0), key=lambda item: -item[1]))
-
-
-def wheel_columns(quantity: str, values: Array, robot: Robot) -> dict[str, Array]:
-    """Columns wheel_<name>_<quantity> of an array (N, W)."""
-    return {
-        f"wheel_{name.replace('-', '_')}_{quantity}": values[:, i]
-        for i, name in enumerate(robot.wheel_names)
-    }
-
-
 def _infeasible(error: InfeasibleError | None) -> dict[str, Any] | None:
     return (
         None
         if error is None
         else {"limit": error.limit, "place_m": error.place, "reason": error.reason}
     )
-
-
-def _timing_table(trajectory: Trajectory) -> dict[str, Array]:
-    """Gridpoints of the speed profile; s'' belongs to the interval after a gridpoint, so the last
-    has none."""
-    return {
-        "u": trajectory.u,
-        "s_m": trajectory.s,
-        "s_dot_m_s": trajectory.sd,
-        "s_ddot_m_s2": np.append(trajectory.sdd, np.nan),
-    }
 
 
 def _trajectory(
@@ -357,6 +312,7 @@ def _trajectory(
         timing["engine"],
         timing["slowdown"],
         problem.start_wheels,
+        problem.start_steering,
     )
 
 

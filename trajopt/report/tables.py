@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 
 from trajopt.optimize.base import OptimizeResult
-from trajopt.report.run_folder import binding_shares
+from trajopt.report.motion import binding_shares
 from trajopt.report.words import words
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution

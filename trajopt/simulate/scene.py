@@ -61,6 +61,9 @@ class Stage:
 def stage(scene: Scene) -> Stage:
     """Solids for an engine. Raises ArgumentError for a ground that no engine can build."""
     ground = scene.ground
+    if scene.friction_varies:
+        expected = "one coefficient in physics: of a problem, ground.friction = one number"
+        raise ArgumentError("scene.friction", "varies", expected)
     plates: tuple[Solid, ...] = ()
     if isinstance(ground, Ramps):
         plates = tuple(Solid("ground", plate, "ground") for plate in _plates(ground))

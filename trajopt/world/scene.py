@@ -13,7 +13,9 @@ from trajopt.world.obstacles import Obstacle
 @dataclass(frozen=True)
 class Scene:
     """``friction`` (coefficient between wheels and ground), the ``ground``'s shape (``Flat()``, a
-    ``Ramps`` or a ``HeightMap``), and ``obstacles`` that stand on it.
+    ``Plane``, ``Ramps``, a ``HeightMap`` or a ``Mesh``), and ``obstacles`` that stand on it. Where
+    ``friction_varies`` from place to place or wheel to wheel, ``friction`` is the least of it, and
+    physics, which drives with one coefficient, refuses.
 
     Raises ArgumentError for a friction at which no wheel drives.
     """
@@ -21,6 +23,7 @@ class Scene:
     friction: float
     ground: Ground
     obstacles: tuple[Obstacle, ...] = ()
+    friction_varies: bool = False
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.friction) and self.friction > 0):

@@ -140,7 +140,7 @@ def with_friction(task: Problem, share: float) -> list[Limit]:
     kept = [
         x for x in task.replace({"limits.variant": None}).limits if x.name not in ("slip", "tip")
     ]
-    return [*kept, Slip(share * task.ground.friction, per_wheel=True)]
+    return [*kept, Slip(share * task.scene.friction, per_wheel=True)]
 
 
 def assert_safe_and_at_the_goal(seen: DrivenEncounter) -> None:
@@ -216,7 +216,7 @@ def test_experiment_3_among_its_obstacles(kind: str) -> None:
     seen = drive_encounter(
         where,
         ROBOT,
-        Scene(task.ground.friction, Flat()),
+        Scene(task.scene.friction, Flat()),
         sensor,
         visitors,
         longest=200.0,
@@ -237,7 +237,7 @@ def test_experiment_6_along_its_profile(manner: Literal["below", "least_squares"
     plan = follow(
         task.path, task.profile.bound, with_friction(task, 0.7), robot=ROBOT, manner=manner
     )
-    seen = drive_plan(plan.trajectory, Scene(task.ground.friction, Flat()), tracker=Tracker())
+    seen = drive_plan(plan.trajectory, Scene(task.scene.friction, Flat()), tracker=Tracker())
     assert seen.goal_offset < 0.02
     assert math.degrees(seen.final_heading_error) < 1.0
     assert seen.speed_error < 0.043  # m/s, what [waheed2006] measured on the robot (Table 18)

@@ -63,7 +63,7 @@ def variant_limits(problem: Problem) -> tuple[Limit, ...]:
         raise broken_rule("limits.variant", "thesis", "none: its slip limit is of a given [path]")
     asked, found = problem.limits_section, list[Limit]()
     if asked.slip:
-        friction = asked.friction(problem.ground.friction)
+        friction = asked.share * problem.scene.friction
         found.append(ThesisSlip(friction))
         largest = largest_curvature(problem)
         if largest > 1e-9:

@@ -163,7 +163,7 @@ def climb_trial(
         )
     scatter = Scatter() if scatter is None else scatter
     rng = np.random.default_rng([number, 11])
-    friction = problem.ground.friction * float(
+    friction = problem.scene.friction * float(
         rng.uniform(1 - scatter.friction, 1 + scatter.friction)
     )
     step = step_scene(problem, friction)
