@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from trajopt.arrays import Array, IndexArray
-from trajopt.jit import compiled
+from trajopt.kernels import kernel
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(8)
 _DEEPEST = 60  # halvings of a cell: down to rounding
 _BISECTIONS = 64  # of a place where ds/du is least
 
 
-@compiled
+@kernel(nogil=True)
 def square_at(cubic: Array, t: float) -> float:
     """(ds/du)^2."""
     total = 0.0
@@ -27,7 +27,7 @@ def square_at(cubic: Array, t: float) -> float:
     return total
 
 
-@compiled
+@kernel(nogil=True)
 def gained(cubic: Array, a: float, b: float) -> float:
     """Path parameter from t = a to b."""
     half, middle, total = (b - a) / 2, (a + b) / 2, 0.0
@@ -36,7 +36,7 @@ def gained(cubic: Array, a: float, b: float) -> float:
     return total * half
 
 
-@compiled
+@kernel(nogil=True)
 def measure(knots: Array, cubics: Array, settled: float) -> tuple[Array, Array, IndexArray]:
     """Left ends u (M,) of quadrature cells, path parameter s (M+1,) at their ends, and the segment
     of each; halving a cell changes less than ``settled`` of the length."""
@@ -82,7 +82,7 @@ def measure(knots: Array, cubics: Array, settled: float) -> tuple[Array, Array, 
     return u[:count].copy(), s[: count + 1].copy(), segment[:count].copy()
 
 
-@compiled
+@kernel(nogil=True)
 def parameters(
     knots: Array, cubics: Array, cells: Array, s: Array, segment: IndexArray, u: Array
 ) -> Array:
@@ -96,7 +96,7 @@ def parameters(
     return found
 
 
-@compiled
+@kernel(nogil=True)
 def places(
     knots: Array, cubics: Array, cells: Array, s: Array, segment: IndexArray, wanted: Array
 ) -> Array:
@@ -140,7 +140,7 @@ def places(
     return found
 
 
-@compiled
+@kernel(nogil=True)
 def slowest(knots: Array, cubics: Array) -> tuple[float, float]:
     """Spline parameter where ds/du is least, and its value there: at a knot or where the slope of
     its square, a cubic, goes from minus to plus."""
