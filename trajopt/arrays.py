@@ -39,21 +39,26 @@ def rotation(angle: ArrayLike) -> Array:
 
 def require_finite(argument: str, value: ArrayLike, unit: str = "") -> None:
     """Raises ArgumentError unless ``value``, a number or an array, is finite everywhere."""
-    if not np.all(np.isfinite(value)):
-        raise ArgumentError(argument, value, f"finite numbers, {unit}".rstrip(", "))
+    expected = f"finite numbers, {unit}".rstrip(", ")
+    if not np.all(np.isfinite(as_numbers(argument, value, expected))):
+        raise ArgumentError(argument, value, expected)
 
 
 def require_positive(argument: str, value: ArrayLike, unit: str = "") -> None:
     """Raises ArgumentError unless ``value``, a number or an array, is finite and > 0 everywhere."""
-    if not (np.all(np.isfinite(value)) and np.all(np.greater(value, 0.0))):
-        raise ArgumentError(argument, value, f"a finite value > 0 {unit}".rstrip())
+    expected = f"a finite value > 0 {unit}".rstrip()
+    numbers = as_numbers(argument, value, expected)
+    if not (np.all(np.isfinite(numbers)) and np.all(numbers > 0.0)):
+        raise ArgumentError(argument, value, expected)
 
 
 def require_not_negative(argument: str, value: ArrayLike, unit: str = "") -> None:
     """Raises ArgumentError unless ``value``, a number or an array, is finite and >= 0
     everywhere."""
-    if not (np.all(np.isfinite(value)) and np.all(np.greater_equal(value, 0.0))):
-        raise ArgumentError(argument, value, f"a finite value >= 0 {unit}".rstrip())
+    expected = f"a finite value >= 0 {unit}".rstrip()
+    numbers = as_numbers(argument, value, expected)
+    if not (np.all(np.isfinite(numbers)) and np.all(numbers >= 0.0)):
+        raise ArgumentError(argument, value, expected)
 
 
 def as_numbers(argument: str, value: Any, expected: str) -> Array:

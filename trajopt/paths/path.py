@@ -13,16 +13,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, IndexArray, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.paths.spline import SplineBasis, chord_length_knots
 
-_STANDSTILL_SAMPLES = 9  # a segment, before roots are looked for; chosen
-_CELLS_PER_SEGMENT = (
-    64  # quadrature cells a spline segment: length error below 1e-12 on smooth paths
-)
+_SETTLED = 1e-14  # of the length: what halving a quadrature cell may change; chosen
+_HALVINGS = 60  # of a quadrature cell at most: down to rounding
 _LARGEST = 1e7  # m (and rad): farther than any robot drives; squares of it keep nine digits of a metre. Chosen
-_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(8)
 
 
 @dataclass(frozen=True)
@@ -40,17 +38,19 @@ class Path:
     turning_length: float = 1.0
 
     def __post_init__(self) -> None:
-        shape = np.shape(self.coordinates)
-        if len(shape) != 2 or shape[0] != self.basis.size or shape[1] not in (2, 3):
-            raise ArgumentError(
-                "coordinates", shape, f"shape ({self.basis.size}, 2) or ({self.basis.size}, 3)"
-            )
-        for name, values in (("coordinates", self.coordinates), ("heading", self.heading)):
-            if values is not None:
-                _check_size(name, values)
-        if self.heading is not None and np.shape(self.heading) != (self.basis.size,):
-            raise ArgumentError("heading", np.shape(self.heading), f"shape ({self.basis.size},)")
-        if not 0 < self.turning_length < np.inf:
+        if not isinstance(self.basis, SplineBasis):
+            raise ArgumentError("basis", self.basis, "a SplineBasis")
+        size = self.basis.size
+        expected = f"numbers of shape ({size}, 2) or ({size}, 3)"
+        shape = np.shape(_numbers("coordinates", self.coordinates, expected))
+        if len(shape) != 2 or shape[0] != size or shape[1] not in (2, 3):
+            raise ArgumentError("coordinates", shape, f"shape ({size}, 2) or ({size}, 3)")
+        if self.heading is not None:
+            yaw = _numbers("heading", self.heading, f"angles of shape ({size},)")
+            if yaw.shape != (size,):
+                raise ArgumentError("heading", yaw.shape, f"shape ({size},)")
+        long = as_numbers("turning_length", self.turning_length, "a finite length > 0 m")
+        if long.ndim or not 0 < long < np.inf:
             raise ArgumentError("turning_length", self.turning_length, "a finite length > 0 m")
         if (
             self.heading is not None
@@ -73,48 +73,58 @@ class Path:
         start_direction: ArrayLike | None = None,
         end_direction: ArrayLike | None = None,
         turning_length: float = 1.0,
+        closed: bool = False,
     ) -> Path:
         """Spline through ``points`` (N, 2) or (N, 3), m; ``heading`` (N,), rad, or None for the
         tangent's.
 
-        ``knots`` (N,) default to chord lengths. ``start_direction`` and ``end_direction`` (2 or 3
-        numbers) are the first derivatives with respect to the knots' parameter; without them the
-        ends are natural. Raises ArgumentError for fewer than two points, coinciding neighbours, or
+        ``knots`` (N,) default to chord lengths; where neighbours coincide but their headings differ
+        (the robot turns on the spot), to the length of chord and turn together.
+        ``start_direction`` and ``end_direction`` (2 or 3 numbers) are the first derivatives with
+        respect to the knots' parameter; without them the ends are natural. ``closed``: a lap that
+        ends as it began, on through its first point, which is added at the end unless it is there
+        (``knots`` then count it); headings go on by the nearest number of whole turns.
+
+        Raises ArgumentError for fewer than two points (a lap: three), neighbours that coincide, or
         numbers that are not finite.
         """
-        array = np.asarray(points, dtype=np.float64)
+        array = _numbers("points", points, "shape (N, 2) or (N, 3) with N >= 2")
         if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] not in (2, 3):
             raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
-        _check_size("points", array)
-        given = (
-            chord_length_knots(array)
-            if knots is None
-            else tuple(np.asarray(knots, dtype=float).tolist())
-        )
-        if len(given) != len(array):
-            raise ArgumentError("knots", len(given), f"one knot a point ({len(array)})")
-        basis = SplineBasis(given, start_direction is not None, end_direction is not None)
-        ends = [
-            np.asarray(d, dtype=np.float64)
-            for d in (start_direction, end_direction)
-            if d is not None
-        ]
-        for end in ends:
-            if end.shape != (array.shape[1],):
-                raise ArgumentError("direction", end.tolist(), f"{array.shape[1]} numbers")
-        coordinates = np.vstack([array, *ends]) if ends else array
         yaw = None
         if heading is not None:
-            yaw = np.asarray(heading, dtype=np.float64)
+            yaw = _numbers("heading", heading, "one angle a point")
             if yaw.shape != (len(array),):
                 raise ArgumentError(
                     "heading", yaw.shape, f"one angle a point, shape ({len(array)},)"
                 )
-            span = (yaw[-1] - yaw[0]) / (
-                given[-1] - given[0]
-            )  # ends turn at the mean rate, if clamped
+        if closed:
+            array, yaw = _lap(array, yaw)
+        given = (
+            _default_knots(array, yaw, turning_length)
+            if knots is None
+            else tuple(as_numbers("knots", knots, "increasing numbers").ravel().tolist())
+        )
+        if len(given) != len(array):
+            raise ArgumentError("knots", len(given), f"one knot a point ({len(array)})")
+        both = (start_direction is not None, end_direction is not None)
+        basis = SplineBasis(given, *both, closed=bool(closed))
+        ends = []
+        for name, end in (("start_direction", start_direction), ("end_direction", end_direction)):
+            if end is not None:
+                ends.append(_numbers(name, end, f"{array.shape[1]} numbers"))
+                if ends[-1].shape != (array.shape[1],):
+                    raise ArgumentError(name, ends[-1].tolist(), f"{array.shape[1]} numbers")
+        coordinates = np.vstack([array, *ends]) if ends else array
+        if yaw is not None and ends:  # ends turn at the mean rate, if clamped
+            span = (yaw[-1] - yaw[0]) / (given[-1] - given[0])
             yaw = np.concatenate([yaw, np.full(len(ends), span)])
         return cls(basis, coordinates, yaw, turning_length)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the path is a lap that goes on where it began."""
+        return self.basis.closed
 
     @property
     def points(self) -> Array:
@@ -166,7 +176,7 @@ class Path:
         knots = np.asarray(self.basis.knots, dtype=np.float64)
         y, m, h = (
             values[: len(knots)],
-            self.basis.second_derivatives @ values,
+            self.basis.bends(values),
             np.diff(knots)[:, None],
         )
         first = np.diff(y, axis=0) / h - h * (2 * m[:-1] + m[1:]) / 6
@@ -197,55 +207,69 @@ class Path:
             squares = squares + (self.turning_length * self.yaw(u, 1)) ** 2
         return np.asarray(np.sqrt(squares))
 
+    @cached_property
+    def scaled_cubics(self) -> tuple[Array, Array]:
+        """Knots (K,) and coefficients (K-1, 4, D), with the heading, if any, times the turning
+        length: ds/du is the length of their derivative."""
+        knots, cubics = self._cubics
+        scale = np.ones(cubics.shape[2])
+        if self.heading is not None:
+            scale[-1] = self.turning_length
+        return knots, np.ascontiguousarray(cubics * scale)
+
+    @property
+    def plain(self) -> bool:
+        """Whether the path is its spline; otherwise it follows a surface."""
+        return type(self).position is Path.position
+
     def standstill(self, share: float) -> float | None:
         """Spline parameter u where ds/du is below ``share`` of its mean, where the path stands
         still or doubles back; None where there is no such place.
 
         Exact: on a segment (ds/du)^2 is a quartic, least at an end or at a root of its derivative.
-        Segments whose ds/du cannot fall to zero between samples, since its slope is bounded, are
-        passed over.
         """
-        knots, cubics = self._cubics
-        scale = np.ones(cubics.shape[2])
-        if self.heading is not None:
-            scale[-1] = self.turning_length
-        _, b, c, d = np.moveaxis(cubics * scale, 1, 0)
-        widths = np.diff(knots)
-        inside = widths[:, None] * np.linspace(0.0, 1.0, _STANDSTILL_SAMPLES)
-        rates = np.linalg.norm(
-            b[:, None] + inside[..., None] * (2 * c[:, None] + 3 * inside[..., None] * d[:, None]),
-            axis=2,
-        )
-        steepest = np.maximum(
-            np.linalg.norm(2 * c, axis=1), np.linalg.norm(2 * c + 6 * widths[:, None] * d, axis=1)
-        )
-        possible = rates.min(axis=1) <= steepest * widths / (_STANDSTILL_SAMPLES - 1)
-        places = [knots]
-        for k in np.flatnonzero(possible):
-            slope = [
-                18 * d[k] @ d[k],
-                18 * c[k] @ d[k],
-                4 * c[k] @ c[k] + 6 * b[k] @ d[k],
-                2 * b[k] @ c[k],
-            ]
-            roots = np.roots(slope)
-            here = roots.real[np.abs(roots.imag) <= 1e-6 * widths[k]]
-            places.append(knots[k] + here[(here > 0) & (here < widths[k])])
-        u = np.concatenate(places)
-        slow = self.rate(u)
-        at = int(np.argmin(slow))
-        return float(u[at]) if slow[at] < share * self.length / (self.end - self.start) else None
+        from trajopt.paths import arc
+
+        u, least = arc.slowest(*self.scaled_cubics)
+        return float(u) if least < share * self.length / (self.end - self.start) else None
+
+    @cached_property
+    def _cells(self) -> tuple[Array, Array, IndexArray]:
+        from trajopt.paths import arc
+
+        return arc.measure(*self.scaled_cubics, _SETTLED)
 
     @cached_property
     def _table(self) -> tuple[Array, Array]:
-        """Spline parameters of the quadrature cells and the path parameter there."""
-        cells = [
-            np.linspace(a, b, _CELLS_PER_SEGMENT, endpoint=False)
-            for a, b in zip(self.basis.knots[:-1], self.basis.knots[1:], strict=True)
-        ]
-        u = np.concatenate([*cells, [self.end]])
-        lengths = self._integrate(u[:-1], u[1:])
-        return u, np.concatenate([[0.0], np.cumsum(lengths)])
+        """Spline parameters of the quadrature cells and the path parameter there. Cells are halved
+        until that changes nothing: ds/du has branch points near sharp bends."""
+        if self.plain:
+            cells, s, _ = self._cells
+            return np.append(cells, self.end), s
+        left, right = np.asarray(self.basis.knots[:-1]), np.asarray(self.basis.knots[1:])
+        whole = self._integrate(left, right)
+        starts, lengths, scale = list[Array](), list[Array](), 0.0
+        for done in range(_HALVINGS):
+            middle = (left + right) / 2
+            first, second = self._integrate(left, middle), self._integrate(middle, right)
+            scale = scale or float(np.sum(first + second))
+            off = np.abs(first + second - whole) > _SETTLED * scale
+            off &= (middle > left) & (middle < right)
+            if done == _HALVINGS - 1:
+                off[:] = False
+            starts += [left[~off], middle[~off]]
+            lengths += [first[~off], second[~off]]
+            if not off.any():
+                break
+            left, right = (
+                np.concatenate([left[off], middle[off]]),
+                np.concatenate([middle[off], right[off]]),
+            )
+            whole = np.concatenate([first[off], second[off]])
+        u, gained = np.concatenate(starts), np.concatenate(lengths)
+        order = np.argsort(u)
+        s = np.concatenate([[0.0], np.cumsum(gained[order])])
+        return np.append(u[order], self.end), s
 
     def _integrate(self, a: Array, b: Array) -> Array:
         """Path parameter gained from a to b (each inside one quadrature cell)."""
@@ -265,27 +289,63 @@ class Path:
 
     def parameter(self, u: ArrayLike) -> Array:
         """(N,): path parameter s at spline parameters u."""
-        grid, s = self._table
         u = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        if self.plain:
+            from trajopt.paths import arc
+
+            (knots, cubics), (cells, s, segment) = self.scaled_cubics, self._cells
+            return arc.parameters(knots, cubics, cells, s, segment, u)
+        grid, s = self._table
         i = np.clip(np.searchsorted(grid, u, side="right") - 1, 0, len(grid) - 2)
         return np.asarray(s[i] + self._integrate(grid[i], u))
 
     def locate(self, s: ArrayLike) -> Array:
-        """(N,): spline parameter u at path parameters s in [0, length]; Newton on the arc
-        length."""
+        """(N,): spline parameter u at path parameters s in [0, length]: inverse cubic, then Newton
+        on the arc length."""
         grid, table = self._table
         s = np.clip(np.atleast_1d(np.asarray(s, dtype=np.float64)), 0.0, self.length)
-        u = np.interp(s, table, grid)
+        if self.plain:
+            from trajopt.paths import arc
+
+            (knots, cubics), (cells, table, segment) = self.scaled_cubics, self._cells
+            return arc.places(knots, cubics, cells, table, segment, s)
         i = np.clip(np.searchsorted(table, s, side="right") - 1, 0, len(grid) - 2)
-        for _ in range(4):
-            residual = table[i] + self._integrate(grid[i], u) - s
+        left, right, width = grid[i], grid[i + 1], table[i + 1] - table[i]
+        share = (s - table[i]) / np.where(width > 0, width, 1.0)
+        u = left + (right - left) * share
+        for _ in range(8):
+            residual = table[i] + self._integrate(left, u) - s
             rate = self.rate(u)
-            u = np.clip(u - residual / np.where(rate > 0, rate, np.inf), grid[i], grid[i + 1])
+            u = np.clip(u - residual / np.where(rate > 0, rate, np.inf), left, right)
+            if np.all(np.abs(residual) <= 1e-11 * width):  # the step just taken squares it
+                break
         return np.asarray(u)
 
 
-def _check_size(name: str, values: Array) -> None:
-    if not np.all(np.abs(values) <= _LARGEST):  # NaN is refused too
-        raise ArgumentError(
-            name, np.asarray(values).tolist(), f"finite numbers, at most {_LARGEST:g} in size"
-        )
+def _numbers(name: str, values: ArrayLike, expected: str) -> Array:
+    """``values`` as numbers that are finite and not beyond reach. Raises ArgumentError."""
+    array = as_numbers(name, values, expected)
+    if not np.all(np.abs(array) <= _LARGEST):  # NaN is refused too
+        raise ArgumentError(name, array.tolist(), f"finite numbers, at most {_LARGEST:g} in size")
+    return array
+
+
+def _default_knots(points: Array, yaw: Array | None, turning_length: float) -> tuple[float, ...]:
+    """Chord lengths, or with turns on the spot chord and turn together."""
+    if yaw is None or np.all(np.any(np.diff(points, axis=0) != 0, axis=1)):
+        return chord_length_knots(points)
+    length = as_numbers("turning_length", turning_length, "a finite length > 0 m")
+    return chord_length_knots(np.column_stack([points, length * yaw]))
+
+
+def _lap(points: Array, yaw: Array | None) -> tuple[Array, Array | None]:
+    """Points and headings that end as they began."""
+    if len(points) > 1 and np.array_equal(points[0], points[-1]):
+        points = points[:-1]
+        yaw = None if yaw is None else yaw[:-1]
+    if len(points) < 3:
+        raise ArgumentError("points", points.tolist(), "three or more points for a closed lap")
+    if yaw is not None:
+        turns = np.round((yaw[-1] - yaw[0]) / (2 * np.pi))
+        yaw = np.append(yaw, yaw[0] + 2 * np.pi * turns)
+    return np.vstack([points, points[:1]]), yaw

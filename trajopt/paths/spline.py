@@ -14,33 +14,40 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, as_numbers
 from trajopt.errors import ArgumentError
+
+_DENSE = 48  # unknowns up to which a dense solve is faster than loading scipy.linalg; chosen
 
 
 @dataclass(frozen=True)
 class SplineBasis:
-    """C2 cubic spline on ``knots`` (K >= 2, increasing), natural or clamped at either end.
+    """C2 cubic spline on ``knots`` (K >= 2, increasing), natural or clamped at either end, or
+    ``closed``: it leaves the last knot as it left the first, with the same first and second
+    derivative.
 
     Control values are the K values at the knots, followed by the first derivative at the start (if
-    ``clamped_start``) and at the end (if ``clamped_end``): ``size`` values in all.
+    ``clamped_start``) and at the end (if ``clamped_end``): ``size`` values in all. Raises
+    ArgumentError for other knots, a closed spline with clamped ends or fewer than three knots.
     """
 
     knots: tuple[float, ...]
     clamped_start: bool = False
     clamped_end: bool = False
+    closed: bool = False
 
     def __post_init__(self) -> None:
-        knots = np.asarray(self.knots, dtype=np.float64)
+        expected = "at least two finite, strictly increasing knots"
+        knots = as_numbers("knots", self.knots, expected)
         if (
             knots.ndim != 1
             or knots.size < 2
             or not np.all(np.isfinite(knots))
             or np.any(np.diff(knots) <= 0)
         ):
-            raise ArgumentError(
-                "knots", self.knots, "at least two finite, strictly increasing knots"
-            )
+            raise ArgumentError("knots", self.knots, expected)
+        if self.closed and (self.clamped_start or self.clamped_end or knots.size < 3):
+            raise ArgumentError("closed", True, "three or more knots and no end directions")
 
     @property
     def size(self) -> int:
@@ -52,26 +59,34 @@ class SplineBasis:
 
     @cached_property
     def second_derivatives(self) -> Array:
-        """(K, size): second derivatives at the knots = matrix @ control values.
+        """(K, size): second derivatives at the knots = matrix @ control values."""
+        return self.bends(np.eye(self.size))
+
+    def bends(self, values: Array) -> Array:
+        """(K, D): second derivatives at the knots of the spline with control values (size, D).
 
         The tridiagonal system of every cubic-spline text: continuity of the first derivative
-        inside, one end condition at each side.
+        inside, one end condition at each side; in time that grows as K.
         """
-        k, h, n = len(self.knots), np.diff(self._knots), self.size
-        left, right = np.zeros((k, k)), np.zeros((k, n))
-        for i in range(1, k - 1):
-            left[i, i - 1 : i + 2] = h[i - 1] / 6, (h[i - 1] + h[i]) / 3, h[i] / 6
-            right[i, i - 1 : i + 2] = 1 / h[i - 1], -1 / h[i - 1] - 1 / h[i], 1 / h[i]
-        left[0, 0] = left[-1, -1] = 1.0
+        k, h = len(self.knots), np.diff(self._knots)
+        slope = np.diff(values[:k], axis=0) / h[:, None]
+        right = np.zeros((k, values.shape[1]))
+        right[1:-1] = np.diff(slope, axis=0)
+        lower, diagonal, upper = np.zeros(k), np.ones(k), np.zeros(k)
+        lower[:-2], upper[2:] = h[:-1] / 6, h[1:] / 6  # as solve_banded stores them
+        diagonal[1:-1] = (h[:-1] + h[1:]) / 3
+        if self.closed:
+            diagonal[0], right[0] = (h[-1] + h[0]) / 3, slope[0] - slope[-1]
+            upper[1] = h[0] / 6
+            inside = _cyclic(lower[:-1], diagonal[:-1], upper[:-1], h[-1] / 6, right[:-1])
+            return np.vstack([inside, inside[:1]])
         if self.clamped_start:
-            left[0, :2] = h[0] / 3, h[0] / 6
-            right[0, :2] = -1 / h[0], 1 / h[0]
-            right[0, k] = -1.0
+            diagonal[0], upper[1] = h[0] / 3, h[0] / 6
+            right[0] = slope[0] - values[k]
         if self.clamped_end:
-            left[-1, -2:] = h[-1] / 6, h[-1] / 3
-            right[-1, k - 2 : k] = 1 / h[-1], -1 / h[-1]
-            right[-1, n - 1] += 1.0
-        return np.asarray(np.linalg.solve(left, right))
+            diagonal[-1], lower[-2] = h[-1] / 3, h[-1] / 6
+            right[-1] = values[-1] - slope[-1]
+        return _banded(lower, diagonal, upper, right)
 
     def matrix(self, u: Array, derivative: int = 0) -> Array:
         """(N, size): the spline's derivative of order 0..3 at parameters ``u`` (N,) = matrix @
@@ -124,12 +139,37 @@ def uniform_basis(points: int) -> SplineBasis:
     return SplineBasis(tuple(float(i) for i in range(1, points + 1)))
 
 
+def _banded(lower: Array, diagonal: Array, upper: Array, right: Array) -> Array:
+    """Solution (K, D) of a tridiagonal system whose bands (K,) are stored as in
+    scipy.linalg.solve_banded."""
+    if len(diagonal) <= _DENSE:
+        matrix = np.diag(diagonal) + np.diag(upper[1:], 1) + np.diag(lower[:-1], -1)
+        return np.asarray(np.linalg.solve(matrix, right))
+    from scipy.linalg import solve_banded
+
+    bands = np.stack([upper, diagonal, lower])
+    return np.asarray(solve_banded((1, 1), bands, right, check_finite=False))
+
+
+def _cyclic(lower: Array, diagonal: Array, upper: Array, corner: float, right: Array) -> Array:
+    """As ``_banded``, with ``corner`` in both other corners of the matrix (Sherman and Morrison)."""
+    turn = -diagonal[0]
+    diagonal, u = diagonal.copy(), np.zeros((len(diagonal), 1))
+    diagonal[0] -= turn
+    diagonal[-1] -= corner**2 / turn
+    u[0], u[-1] = turn, corner
+    both = _banded(lower, diagonal, upper, np.hstack([right, u]))
+    y, q = both[:, :-1], both[:, -1:]
+    share = (y[0] + y[-1] * corner / turn) / (1 + q[0] + q[-1] * corner / turn)
+    return np.asarray(y - q * share)
+
+
 def chord_length_knots(points: Array) -> tuple[float, ...]:
     """Knots spaced by the distance between consecutive points (N, D), starting at 0.
 
     Raises ArgumentError when two consecutive points coincide.
     """
-    chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    chords = np.sqrt(np.sum(np.diff(points, axis=0) ** 2, axis=1))
     if np.any(chords <= 0):
         where = int(np.argmin(chords))
         raise ArgumentError(
