@@ -46,7 +46,9 @@ def random_ground(kind: str, rng: np.random.Generator) -> Ground:
         return Plane(np.radians(rng.uniform(0, 12)), rng.uniform(-np.pi, np.pi))
     if kind == "ramp":
         place, direction = rng.uniform(-0.5, 2.0, 2), rng.uniform(-np.pi, np.pi)
-        ramp = Ramp(tuple(place), direction, rng.uniform(1, 3), rng.uniform(0.1, 0.4), 0.6, "smooth")
+        ramp = Ramp(
+            tuple(place), direction, rng.uniform(1, 3), rng.uniform(0.1, 0.4), 0.6, "smooth"
+        )
         return Ramps((ramp,), 1.0)
     if kind == "rough":
         return rough_ground(0.02, rng=rng, size=16.0, correlation=1.2, spacing=0.2)

@@ -32,7 +32,9 @@ CURVE = [[0, 0], [1, 0.4], [2, -0.2], [3, 0.5]]
 GENTLE = [[0, 0], [1.5, 0.2], [3, -0.1], [4.5, 0.3]]
 
 
-def along_of(one: Robot, ground: Plane | HeightMap | Ramps, path: Path, s: np.ndarray) -> PathSamples:
+def along_of(
+    one: Robot, ground: Plane | HeightMap | Ramps, path: Path, s: np.ndarray
+) -> PathSamples:
     found = track(path, one, ground)
     return found.samples(s, found.path.locate(s))
 
@@ -306,7 +308,9 @@ def test_a_plane_height_map_is_the_plane(name):
 
 def test_on_a_plane_mass_does_not_matter():
     one = robot("loc8")
-    heavy = one.replace({"body.mass": 60.0, "body.yaw_inertia": one.yaw_inertia * 60 / one.body.mass})
+    heavy = one.replace(
+        {"body.mass": 60.0, "body.yaw_inertia": one.yaw_inertia * 60 / one.body.mass}
+    )
     path = Path.through(CURVE, heading=[0.2, 1.0, 0.1, -0.7], turning_length=0.5)
     times = [
         time_scale(path, LIMITS, robot=r, ground=Plane(0.15, 0.7), gridpoints=100).duration
@@ -327,9 +331,7 @@ def test_edges_of_moving_contacts_are_those_of_each_place():
         for i in range(6):
             expected = sorted(zip(*support_edges(places[i])[::-1], strict=True), key=lambda e: e[0])
             found = [
-                (d, n)
-                for d, n in zip(distances[i], normals[i], strict=True)
-                if np.hypot(*n) > 0.5
+                (d, n) for d, n in zip(distances[i], normals[i], strict=True) if np.hypot(*n) > 0.5
             ]
             assert len(found) == len(expected)
             for (d, n), (d1, n1) in zip(sorted(found, key=lambda e: e[0]), expected, strict=True):
@@ -389,7 +391,9 @@ def test_friction_one_a_wheel_along_the_path_and_over_a_map():
     grid = FrictionMap(np.tile(0.6 - 0.1 * x, (31, 1)), 0.1, (-1.0, -1.5))
     loads = contact_loads(samples, one).c
     turn = samples.rotation[:, :2, :2]
-    places = samples.position[:, None, 0] + (np.array(one.body.contacts) @ turn.swapaxes(1, 2))[..., 0]
+    places = (
+        samples.position[:, None, 0] + (np.array(one.body.contacts) @ turn.swapaxes(1, 2))[..., 0]
+    )
     mu = 0.6 - 0.1 * places
     needed = Slip(grid).needed(samples, one, zero, zero)
     single = [Slip(1.0).needed(samples, one, zero, zero)[i] for i in range(3)]
