@@ -19,5 +19,13 @@ def made_up(times: np.ndarray, **known: Any) -> Recording:
         "swivels": none,
     }  # fmt: skip
     fields |= dict.fromkeys(("height", "roll", "pitch", "speed"), flat)
-    wheels = ("wheel_angles", "wheel_speeds", "wheel_torques", "wheel_heights", "loads", "slip")
+    wheels = (
+        "wheel_angles",
+        "wheel_speeds",
+        "wheel_torques",
+        "wheel_heights",
+        "loads",
+        "slip",
+        "spin_angles",
+    )
     return Recording(**(fields | dict.fromkeys(wheels, four) | known))

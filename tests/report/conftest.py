@@ -11,6 +11,7 @@ from tests.recordings import made_up
 from trajopt.problem import Problem
 from trajopt.simulate.check import ValidationReport
 from trajopt.simulate.engine import Hit
+from trajopt.simulate.plan import wheel_plan
 from trajopt.solution import Solution
 from trajopt.systems.smdw.thesis import through_drives
 
@@ -84,4 +85,6 @@ def drifted(exact: Solution) -> ValidationReport:
         3.5,
         plan.pose,
         recording,
+        wheel_plan(trajectory, times),
+        plan.steering_angles,
     )

@@ -144,7 +144,7 @@ def test_mujoco_has_the_described_mass_and_inertia(name: str) -> None:
     machine = ROBOTS[name]
     model, found = build(machine), []
     for angle in (0.0, math.pi):
-        start = Start((0.0, 0.0, 0.0), 0.0, turned(model, angle))
+        start = Start(np.array((0.0, 0.0, 0.0)), np.eye(3), turned(model, angle))
         with make_engine("mujoco").open(model, stage(SCENE), start, None) as session:
             body, compiled, data = session.body, session.compiled, session.data
             masses, turns = compiled.body_mass[body], data.ximat[body].reshape(-1, 3, 3)
@@ -161,7 +161,7 @@ def test_bullet_has_the_described_mass_and_inertia(name: str) -> None:
     machine = ROBOTS[name]
     model, found = build(machine), []
     for angle in (0.0, math.pi):
-        start = Start((0.0, 0.0, 0.0), 0.0, turned(model, angle))
+        start = Start(np.array((0.0, 0.0, 0.0)), np.eye(3), turned(model, angle))
         with make_engine("pybullet").open(model, stage(SCENE), start, None) as session:
             bullet, rows = session.bullet, []
             for joint in session.joint:

@@ -18,8 +18,10 @@ from trajopt.simulate.scene import stage
 from trajopt.simulate.stepping import drive, open_session
 from trajopt.simulate.straight import straight_command
 from trajopt.world.height_map import HeightMap
+from trajopt.world.mesh import Mesh
 from trajopt.world.obstacles import Circle, Polygon, Step, Wall
 from trajopt.world.ramp import Ramp, Ramps
+from trajopt.world.rough import rough_ground
 from trajopt.world.scene import Scene
 from trajopt.world.terrain import Flat
 
@@ -62,9 +64,35 @@ def test_ramps_are_plates_through_their_rounded_profile() -> None:
         assert abs((top[1] - top[0])[:2] @ [-along[1], along[0]]) < 1e-9
     heights = [plate.shape.pose.place[2] for plate in plates]
     assert len(set(np.round(heights, 6))) > 15
-    across = replace(down, direction=1.0)
-    with pytest.raises(ArgumentError, match=r"ground\.ramps.*along one line"):
-        stage(Scene(0.8, Ramps((up, across), grade=0.5)))
+
+
+def test_every_other_ground_is_a_height_field_of_its_smooth_surface() -> None:
+    """Off by less than 1 mm anywhere; a map's own points are points of the field."""
+    ramps = Ramps((Ramp((1.0, 0.0), 0.0, 2.0, 0.3, 0.4), Ramp((0.0, 1.0), 1.0, 2.0, 0.2, 0.3)), 0.5)
+    rng = np.random.default_rng(1)
+    hills = rough_ground(0.02, rng=rng, size=6.0, correlation=0.8, spacing=0.1)
+    corners = np.array([[x, y, z] for x, y in ((-3.0, -3.0), (3.0, -3.0), (3.0, 3.0), (-3.0, 3.0))
+                        for z in [0.1 * x + 0.05 * y]])  # fmt: skip
+    mesh = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), 0.1)
+    x, y = rng.uniform(-1.4, 1.4, (2, 500))
+    for ground in (ramps, hills, mesh):
+        stand = stage(Scene(0.8, ground), ((-1.5, -1.5), (1.5, 1.5)))
+        field = stand.field
+        assert field is not None
+        assert not stand.solids
+        assert stand.plane is None
+        assert not stand.broken
+        assert field.spacing <= 0.02 + 1e-9
+        np.testing.assert_allclose(
+            field.height(x, y),
+            ground.partial(x, y, 0, 0),
+            atol=1e-3 if ground is not mesh else 1e-9,
+        )
+    every = round(hills.spacing / field.spacing)
+    assert every == 5
+    steep = rough_ground(0.2, rng=rng, size=6.0, correlation=0.2, spacing=0.1)
+    with pytest.raises(ArgumentError, match=r"(?s)scene\.ground.*m off it"):
+        stage(Scene(0.8, steep), ((-1.5, -1.5), (1.5, 1.5)))
 
 
 def test_unknown_ground_is_refused_by_name() -> None:
@@ -76,8 +104,9 @@ def test_unknown_ground_is_refused_by_name() -> None:
         def check(self, path):
             pass
 
-    with pytest.raises(ArgumentError, match=r"scene\.ground.*Crater.*Flat"):
-        stage(Scene(0.8, Crater()))
+    for area in (None, ((-1.0, -1.0), (1.0, 1.0))):
+        with pytest.raises(ArgumentError, match=r"scene\.ground.*Crater.*Flat"):
+            stage(Scene(0.8, Crater()), area)
 
 
 def test_polygons_are_cut_into_convex_pieces_that_fill_them() -> None:
@@ -105,7 +134,7 @@ def test_height_fields_are_the_maps_triangles(engine: str) -> None:
     rng = np.random.default_rng(0)
     ground = HeightMap(rng.normal(0.0, 0.2, (12, 17)), 0.3, (-2.0, -1.5))
     model = build(SMALL, discs=True, outline=False)
-    start = Start((0.0, 0.0, 50.0), 0.0, {})
+    start = Start(np.array((0.0, 0.0, 50.0)), np.eye(3), {})
     places = rng.uniform([-1.9, -1.4], [2.6, 1.6], (60, 2))
     with make_engine(engine).open(model, stage(Scene(0.8, ground)), start, None) as session:
         if engine == "mujoco":

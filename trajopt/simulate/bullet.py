@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.simulate.engine import Camera, Start
-from trajopt.simulate.model import Model, Shape, Vector
-from trajopt.simulate.scene import Solid, Stage
+from trajopt.simulate.model import Model, Shape, Vector, quaternion_of
+from trajopt.simulate.scene import MOST_POINTS, Solid, Stage
 from trajopt.simulate.urdf import model_urdf
 from trajopt.world.height_map import HeightMap
 
@@ -22,13 +22,11 @@ from trajopt.world.height_map import HeightMap
 WHEELS, GROUND, OUTLINE, OBSTACLES = (2, 1), (1, 2), (8, 4), (4, 8)
 # Rounded margin that Bullet adds around convex hulls of a URDF [m] (gUrdfDefaultCollisionMargin).
 HULL_MARGIN = 0.001
-MOST_POINTS = 250_000  # of a height field; Bullet copies them through Python, chosen
 # Functions of the module that compute and know no client.
 _PURE = (
     "computeProjectionMatrixFOV",
     "computeViewMatrixFromYawPitchRoll",
     "getMatrixFromQuaternion",
-    "rotateVector",
 )
 
 
@@ -55,8 +53,9 @@ class Client:
 def build_stage(bullet: Client, stage: Stage, visible: bool) -> dict[int, int]:
     """The stage's bodies: number of the solid (-1: plane or field) by Bullet's number."""
     found: dict[int, int] = {}
-    if stage.plane:
-        found[bullet.createMultiBody(0.0, bullet.createCollisionShape(bullet.GEOM_PLANE))] = -1
+    if stage.plane is not None:
+        shape = bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=stage.plane.normal)
+        found[bullet.createMultiBody(0.0, shape)] = -1
     if stage.field is not None:
         found[_field(bullet, stage.field)] = -1
     for i, solid in enumerate(stage.solids):
@@ -124,9 +123,9 @@ def _geometry(bullet: Client, shape: Shape) -> tuple[int, dict[str, Any]]:
 
 
 def load_robot(bullet: Client, model: Model, start: Start, visible: bool) -> int:
-    half = start.yaw / 2.0
-    turn = (0.0, 0.0, math.sin(half), math.cos(half))
-    arm = np.array(bullet.rotateVector(turn, model.links[0].cog))
+    w, *vector = quaternion_of(start.rotation)
+    turn = (*vector, w)
+    arm = start.rotation @ np.array(model.links[0].cog)
     with tempfile.TemporaryDirectory(prefix="trajopt-") as folder:
         path = Path(folder) / "robot.urdf"
         text = model_urdf(model, Path(folder), margin=HULL_MARGIN, visible=visible)
@@ -135,7 +134,7 @@ def load_robot(bullet: Client, model: Model, start: Start, visible: bool) -> int
             return int(
                 bullet.loadURDF(
                     str(path),
-                    basePosition=(np.array(start.place) + arm).tolist(),
+                    basePosition=(start.place + arm).tolist(),
                     baseOrientation=turn,
                     flags=bullet.URDF_USE_INERTIA_FROM_FILE | bullet.URDF_USE_IMPLICIT_CYLINDER,
                 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,14 +16,12 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.robots.robot import Robot
 from trajopt.simulate.build import build
 from trajopt.simulate.engine import Camera, Command, Engine, Hit, Recording
+from trajopt.simulate.plan import WheelPlan, area_of, open_loop, triple, wheel_plan
 from trajopt.simulate.sensors import Sensors
 from trajopt.simulate.stepping import drive
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.scene import Scene
 from trajopt.world.terrain import Flat
-
-SAMPLE_TIME = 0.002  # s between wheel speed commands: the engines' own step
-COAST = 0.5  # s after the last command in which the robot comes to rest; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +34,9 @@ class ValidationReport:
     plan ends (what a controller bends on purpose counts too). ``contacts``: obstacles that were
     touched, which, when, where. ``slip`` (A,): largest speed (m/s) over the ground, in the
     directions in which it holds, of each of ``wheels``, the names of all wheels of the robot's
-    file. ``planned`` (N, 3) are the planned poses at the recording's times. ``control`` and
-    ``seed`` say what was switched on; None: the planned wheel speeds.
+    file. ``planned`` (N, 3) and ``wheel_plan`` are what the plan has at the recording's times,
+    ``steering`` (N, A) are measured angles. ``control`` and ``seed`` say what was switched on;
+    None: the planned wheel speeds.
     """
 
     engine: str
@@ -54,6 +53,8 @@ class ValidationReport:
     real_time_factor: float
     planned: Array = field(repr=False)
     recording: Recording = field(repr=False)
+    wheel_plan: WheelPlan = field(repr=False)
+    steering: Array = field(repr=False)
     control: Mode | None = None
     seed: int = 0
 
@@ -61,6 +62,17 @@ class ValidationReport:
     def final_distance(self) -> float:
         """Distance of the final position from the planned one, m."""
         return float(np.hypot(self.along, self.across))
+
+    @property
+    def steering_error(self) -> Array:
+        """(A,): largest difference, rad, between each wheel's steering or castor angle and the
+        plan's."""
+        return np.asarray(np.abs(self.steering - self.wheel_plan.steering).max(axis=0))
+
+    @property
+    def spin_error(self) -> Array:
+        """(A,): final spin angle minus planned, rad, of all wheels."""
+        return np.asarray(self.recording.spin_angles[-1] - self.wheel_plan.spin[-1])
 
 
 def validate(
@@ -91,51 +103,32 @@ def validate(
         raise ArgumentError("seed", seed, "a whole number >= 0")
     first = trajectory.at(0.0).pose[0]
     pose = first if start is None else np.asarray(start, dtype=np.float64)
-    swivels = trailing(trajectory)
-    camera = Camera() if picture else None
+    camera, area = Camera() if picture else None, area_of(trajectory, pose)
+    command = open_loop(trajectory, build(robot), pose)
+    end, clock = trajectory.duration, None
     if control is None:
-        command = open_loop(trajectory, pose, swivels)
-        recording = drive(robot, scene, command, engine=engine, picture=camera)
-        planned = trajectory.at(np.minimum(recording.times, trajectory.duration))
-        wheels, end = planned.wheel_angles[-1], trajectory.duration
-        poses = planned.pose
+        recording = drive(robot, scene, command, engine=engine, picture=camera, area=area)
     else:
         followed = _followed(trajectory, robot, control, critical)
-        wheels, end = followed.wheels, float(followed.times[-1])
-        still = np.zeros((2, len(robot.wheels)))
-        command = Command(
-            np.array([0.0, end + followed.settle]), still, None, _triple(pose),
-            trajectory.start_wheels, swivels,
+        end, clock = float(followed.times[-1]), followed
+        assert command.angles is not None
+        command = replace(
+            command, times=np.array([0.0, end + followed.settle]),
+            wheel_speeds=np.zeros((2, len(robot.wheels))), angles=command.angles[[0, 0]],
         )  # fmt: skip
         recording = drive(
             robot, scene, command, engine=engine, picture=camera, controller=followed.controller,
-            sense=Sensors().sense(np.random.default_rng(seed)),
+            sense=Sensors().sense(np.random.default_rng(seed)), area=area,
         )  # fmt: skip
-        times = followed.times
-        poses = np.column_stack(
-            [np.interp(recording.times, times, column) for column in followed.pose.T]
-        )
     if recording.exploded:
         raise SimulationError(
             f"{recording.engine}: the simulation left physics after {recording.times[-1]:.3g} s: "
             + recording.reason
         )
-    return _compared(robot, poses, wheels, recording, end, control, seed)
-
-
-def open_loop(trajectory: Trajectory, pose: Array, swivels: Array | None = None) -> Command:
-    """The planned wheel speeds from ``pose`` (3,) on, then rest. A trajectory that ends in motion
-    is stopped: the engine gets zero speed after the last sample."""
-    samples = max(2, round(trajectory.duration / SAMPLE_TIME) + 1)
-    times = np.linspace(0.0, trajectory.duration, samples)
-    speeds = trajectory.at(times).wheel_speeds
-    rest = np.zeros((1, speeds.shape[1]))
-    moving = not np.allclose(speeds[-1], 0)
-    rows = np.vstack([speeds[:-1], rest, rest] if moving else [speeds, rest])
-    return Command(
-        np.append(times, times[-1] + COAST), rows, None, _triple(pose), trajectory.start_wheels,
-        swivels,
-    )  # fmt: skip
+    times = recording.times
+    if clock is not None:
+        times = np.interp(times, clock.times, clock.planned)
+    return _compared(trajectory, times, recording, end, control, seed)
 
 
 def _driven_robot(trajectory: Trajectory, scene: Scene) -> Robot:
@@ -146,7 +139,7 @@ def _driven_robot(trajectory: Trajectory, scene: Scene) -> Robot:
         )
     if not robot.driven:
         raise ArgumentError("trajectory.robot", robot.name, "a robot with a motor")
-    if isinstance(scene.ground, Flat) and trajectory.path.coordinates.shape[1] > 2:
+    if isinstance(scene.ground, Flat) and trajectory.path.position(trajectory.u)[:, 2].any():
         raise ArgumentError(
             "scene.ground",
             scene.ground,
@@ -155,37 +148,14 @@ def _driven_robot(trajectory: Trajectory, scene: Scene) -> Robot:
     return robot
 
 
-def trailing(trajectory: Trajectory) -> Array:
-    """Angles (C,) of castors that trail where the plan goes first; those with a motor stand as the
-    plan has them, at 0."""
-    assert trajectory.robot is not None
-    model = build(trajectory.robot)
-    times = np.linspace(0.0, trajectory.duration, 101)[1:]
-    twists = trajectory.at(times).twist
-    vx, vy, wz = twists[int(np.argmax(np.abs(twists).max(axis=1) > 1e-3))]
-    driven = {
-        k
-        for spin, has_motor in zip(model.spins, model.driven, strict=True)
-        if has_motor
-        for k in model.above(spin)
-    }
-    found = []
-    for link in model.swivels:
-        (x, y, _), frame = model.frames[link]
-        ahead = math.atan2(vy + wz * x, vx - wz * y) - math.atan2(frame[1, 0], frame[0, 0])
-        found.append(0.0 if link in driven else ahead)
-    return np.array(found)
-
-
 @dataclass(frozen=True, eq=False)
 class _Followed:
-    """A controller, and what it follows: ``times`` (N,), ``pose`` (N, 3), final ``wheels`` (W,);
-    ``settle`` (s): how long it goes on after the end."""
+    """A controller that follows the plan: at ``times`` (N,), s, it is where the trajectory is at
+    ``planned`` (N,); ``settle`` (s): how long it goes on after the end."""
 
     controller: Controller
     times: Array
-    pose: Array
-    wheels: Array
+    planned: Array
     settle: float
 
 
@@ -194,10 +164,7 @@ def _followed(
 ) -> _Followed:
     if mode == "pose" and not robot.holonomic:
         tracking = TrackingController(trajectory, Tracker(), robot)
-        state = tracking.reference
-        return _Followed(
-            tracking, tracking.times, state.pose, state.wheel_angles[-1], tracking.tracker.settle
-        )
+        return _Followed(tracking, tracking.times, tracking.times, tracking.tracker.settle)
     if mode == "pose and phase" and not robot.holonomic:
         raise ArgumentError("control", mode, "wheel servo or pose for a robot that has to turn")
     if mode == "pose and phase" and not critical:
@@ -207,21 +174,25 @@ def _followed(
     approach = approach_controller(
         trajectory, robot, trajectory.start_wheels, critical, cap=cap, mode=mode
     )
-    plan = approach.reference
-    return _Followed(approach, plan.times, plan.pose, plan.wheels[-1], SETTLE)
+    times = approach.reference.times
+    planned = np.linspace(0.0, trajectory.duration, len(times))
+    return _Followed(approach, times, planned, SETTLE)
 
 
 def _compared(
-    robot: Robot,
-    planned: Array,
-    wheels: Array,
+    trajectory: Trajectory,
+    times: Array,
     recording: Recording,
     end: float,
     control: Mode | None,
     seed: int,
 ) -> ValidationReport:
-    """Against the planned poses (N, 3) at the recording's times and the planned final wheel angles
-    (W,); the plan ends at ``end`` (s)."""
+    """Against the plan at ``times`` (N,) of the trajectory, one for each of the recording's; the
+    plan ends at ``end`` (s)."""
+    robot = trajectory.robot
+    assert robot is not None
+    state = trajectory.at(np.minimum(times, trajectory.duration))
+    planned = state.pose
     error = recording.pose - planned
     distance = np.hypot(error[:, 0], error[:, 1])[recording.times <= end]
     heading = _final_direction(planned)
@@ -231,7 +202,7 @@ def _compared(
         float(np.cos(heading) * dx + np.sin(heading) * dy),
         float(-np.sin(heading) * dx + np.cos(heading) * dy),
         float(error[-1, 2]),
-        recording.wheel_angles[-1] - wheels,
+        recording.wheel_angles[-1] - state.wheel_angles[-1],
         float(np.sqrt(np.mean(distance**2))),
         float(distance.max()),
         float(np.sum(np.hypot(*np.diff(planned[:, :2], axis=0).T))),
@@ -241,13 +212,11 @@ def _compared(
         recording.real_time_factor,
         planned,
         recording,
+        wheel_plan(trajectory, times),
+        build(robot).steering(recording.angles, recording.swivels),
         control,
         seed,
     )
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])
 
 
 def _final_direction(poses: Array) -> float:

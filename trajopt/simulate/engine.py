@@ -88,11 +88,11 @@ def _between(command: Command, rows: Array, moments: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where a session begins: origin of the robot frame (m), ``yaw``, and joint ``angles`` (rad) by
-    link."""
+    """Where a session begins: origin of the robot frame (m), its axes as columns of ``rotation``
+    (3, 3), and joint ``angles`` (rad) by link."""
 
-    place: Vector
-    yaw: float
+    place: Array
+    rotation: Array
     angles: Mapping[int, float]
 
 
@@ -145,8 +145,9 @@ class Observation:
     (3,) rad/s; ``wheel_angles`` counted on, ``wheel_speeds`` rad/s, ``wheel_torques`` N m (W,),
     ``wheel_places`` (W, 3) m of the centres; ``angles`` (S,) of steered wheels and driven axles,
     ``swivels`` (C,) rad; ``loads`` (A,) N on the wheels, ``slip`` (A,) m/s: speed of a wheel over
-    the ground in the directions in which it holds; ``contacts`` with the ground, the deepest one's
-    ``penetration`` (m), and ``hits``: names and places (x, y) of obstacles touched.
+    the ground in the directions in which it holds; ``spin_angles`` (A,) rad, counted on, 0 for
+    balls; ``contacts`` with the ground, the deepest one's ``penetration`` (m), and ``hits``: names
+    and places (x, y) of obstacles touched.
     """
 
     position: Array
@@ -161,6 +162,7 @@ class Observation:
     swivels: Array
     loads: Array
     slip: Array
+    spin_angles: Array
     contacts: int
     penetration: float
     hits: tuple[tuple[str, tuple[float, float]], ...]
@@ -191,7 +193,7 @@ class Recording:
     ``pitch`` (rad) (N,) of the robot frame, its ``speed`` (N,) m/s along the heading;
     ``wheel_angles`` rad, counted on, ``wheel_speeds`` rad/s, ``wheel_torques`` N m and
     ``wheel_heights`` m of the wheel centres, all (N, W); ``angles`` (N, S), ``swivels`` (N, C) rad;
-    ``loads`` N and ``slip`` m/s (N, A); ``contacts`` (N,); ``hits`` of obstacles. ``exploded`` with
+    ``loads`` N, ``slip`` m/s and ``spin_angles`` rad (N, A); ``contacts`` (N,); ``hits`` of obstacles. ``exploded`` with
     its ``reason`` when the run was stopped because the numbers left physics. ``wall_time`` s of
     stepping, ``real_time_factor`` simulated over wall time, ``picture`` (H, W, 3) uint8 when asked;
     where the engine found no graphics to draw it, ``no_picture`` says why.
@@ -213,6 +215,7 @@ class Recording:
     swivels: Array
     loads: Array
     slip: Array
+    spin_angles: Array
     contacts: IntArray
     hits: tuple[Hit, ...]
     exploded: bool

@@ -32,10 +32,20 @@ def observe(session: Session) -> Observation:
         session.joints(model.swivels)[0] if model.swivels else NONE,
         loads,
         slip,
+        _turned(session),
         int(np.count_nonzero(contacts.solid < 0)),
         float(contacts.depth.max(initial=0.0)),
         _hits(session.stage, contacts) if len(contacts.link) else (),
     )
+
+
+def _turned(session: Session) -> Array:
+    """(A,): angles of all wheels that turn."""
+    feet = session.model.feet
+    turning = [i for i, foot in enumerate(feet) if session.model.links[foot].joint.role == "spin"]
+    found = np.zeros(len(feet))
+    found[turning] = session.joints(tuple(feet[i] for i in turning))[0]
+    return found
 
 
 def _wheels(session: Session, contacts: Contacts, feet: Motion) -> tuple[Array, Array]:

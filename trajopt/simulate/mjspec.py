@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from trajopt.robots.robot import STANDARD_GRAVITY
-from trajopt.simulate.model import Colour, Link, Model, Shape
+from trajopt.simulate.model import Colour, Link, Model, Pose, Shape
 from trajopt.simulate.scene import PLATE, Stage
 from trajopt.world.height_map import HeightMap
 
@@ -75,9 +75,10 @@ class SpecBuilder:
         floor = self.spec.add_material(name="floor", texrepeat=[1, 1], texuniform=True)
         floor.textures[self.mujoco.mjtTextureRole.mjTEXROLE_RGB] = "checks"
         kinds = self.mujoco.mjtGeom
-        if stage.plane:
+        if stage.plane is not None:
             ground = self._geom(world, "ground", kinds.mjGEOM_PLANE, [0, 0, 1], GROUND)
             ground.material = "floor"
+            ground.quat = Pose.along(stage.plane.normal).quaternion
         if stage.field is not None:
             self._field(stage.field)
         for i, solid in enumerate(stage.solids):

@@ -62,6 +62,21 @@ class Shape:
     corners: tuple[Vector, ...] = ()
 
 
+def quaternion_of(rotation: Array) -> tuple[float, float, float, float]:
+    """(w, x, y, z) of a rotation matrix (3, 3) by less than half a turn."""
+    w = math.sqrt(max(1.0 + float(np.trace(rotation)), 0.0)) / 2.0
+    if w > 0.1:
+        x, y, z = (float(rotation[i, j] - rotation[j, i]) for i, j in ((2, 1), (0, 2), (1, 0)))
+        return w, x / (4.0 * w), y / (4.0 * w), z / (4.0 * w)
+    k = int(np.argmax(np.diag(rotation)))  # nearly half a turn about an axis near this one
+    i, j = (k + 1) % 3, (k + 2) % 3
+    part = math.sqrt(1.0 + float(rotation[k, k] - rotation[i, i] - rotation[j, j])) / 2.0
+    found = [0.0, 0.0, 0.0]
+    found[k], found[i] = part, float(rotation[i, k] + rotation[k, i]) / (4.0 * part)
+    found[j] = float(rotation[j, k] + rotation[k, j]) / (4.0 * part)
+    return float(rotation[j, i] - rotation[i, j]) / (4.0 * part), *found  # type: ignore[return-value]
+
+
 def cross(a: Array, b: Array) -> Array:
     """Vector products (n, 3); numpy's own takes ten times as long on a few rows."""
     (ax, ay, az), (bx, by, bz) = a.T, b.T
@@ -234,6 +249,31 @@ class Model:
             found.append(parent)
             parent = self.links[parent].parent
         return found
+
+    @cached_property
+    def _turned(self) -> tuple[tuple[int, ...], IntArray]:
+        """Links that turn about a vertical axis, ``targets`` and ``swivels`` in turn, and the link
+        among them that each wheel of the file hangs on (A,), -1: none."""
+        links = self.targets + self.swivels
+        roles = ("steer", "swivel")
+        turning = [
+            [k for k in self.above(f) if self.links[k].joint.role in roles] for f in self.feet
+        ]
+        return links, np.array([links.index(found[0]) if found else -1 for found in turning])
+
+    def steering(self, angles: Array, swivels: Array) -> Array:
+        """(..., A): steering angle (rad) of each wheel of the file at angles (..., S) of
+        ``targets`` and (..., C) of ``swivels``."""
+        joints = np.concatenate([angles, swivels, np.zeros((*np.shape(angles)[:-1], 1))], axis=-1)
+        return np.asarray(joints[..., self._turned[1]])
+
+    def joints_at(self, steering: Array) -> tuple[Array, Array]:
+        """Angles (..., S) of ``targets`` and (..., C) of ``swivels`` at which the file's wheels have
+        these ``steering`` angles (..., A); axles that tilt stay level."""
+        links, on = self._turned
+        found = np.zeros((*np.shape(steering)[:-1], len(links)))
+        found[..., on[on >= 0]] = steering[..., on >= 0]
+        return found[..., : len(self.targets)], found[..., len(self.targets) :]
 
     @property
     def mass(self) -> float:

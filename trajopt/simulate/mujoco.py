@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from trajopt.arrays import Array, IndexArray, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
-from trajopt.simulate.mjspec import SpecBuilder
-from trajopt.simulate.model import Model, cross
+from trajopt.simulate.mjspec import STEERING_RATE, SpecBuilder
+from trajopt.simulate.model import Model, cross, quaternion_of
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
 
@@ -102,6 +102,11 @@ class _Session:
         self.rate = {i: int(compiled.jnt_dofadr[j]) for i, j in joint.items()}
         self.offset = dict.fromkeys(joint, 0.0)
         self.driven = np.array(model.driven, dtype=bool)
+        # steps by which each target lags behind an angle that changes evenly
+        lag = 2.0 / (STEERING_RATE * compiled.opt.timestep)
+        servo = [model.links[t].joint.drive == "position" for t in model.targets]
+        self.lag = np.where(servo, lag, 0.0)
+        self.before: Array | None = None
         self.motors = [s for s, driven in zip(model.spins, model.driven, strict=True) if driven]
         self.rotors = [int(compiled.joint(f"rotor_link_{s}").dofadr[0]) for s in self.motors]
         # of every geom: the robot's link, the stage's solid; -1 for none
@@ -114,18 +119,24 @@ class _Session:
     def place(self, start: Start) -> None:
         """Put the robot where it begins. Small angles keep their digits: whole turns are added
         when reading."""
-        half = start.yaw / 2.0
-        self.data.qpos[:7] = (*start.place, math.cos(half), 0.0, 0.0, math.sin(half))
+        self.data.qpos[:7] = (*start.place, *quaternion_of(start.rotation))
         for link, angle in start.angles.items():
             self.data.qpos[self.angle[link]] = fold(angle)
             self.offset[link] = angle - fold(angle)
+        self.turns = np.array([self.offset[t] for t in self.model.targets])
         self.mujoco.mj_forward(self.compiled, self.data)
 
     def advance(self, wheel_speeds: Array, angles: Array) -> None:
         """See ``engine.Session``."""
         self.data.qvel[self.rotors] = wheel_speeds[self.driven]
-        self.data.ctrl[:] = angles
+        self.data.ctrl[:] = self._leading(angles)
         self.mujoco.mj_step(self.compiled, self.data)
+
+    def _leading(self, angles: Array) -> Array:
+        """What servos are told: as far ahead of ``angles`` as they lag behind what turns evenly."""
+        before = angles if self.before is None else self.before
+        self.before = angles.copy()
+        return angles - self.turns + self.lag * (angles - before)
 
     def base(self) -> Motion:
         """See ``engine.Session``."""

@@ -159,6 +159,8 @@ class _Session:
             # small angles keep their digits: whole turns are added when reading
             bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
             self.offset[link] = float(angle - fold(float(angle)))
+        self.turns = np.array([self.offset[link] for link in model.targets])
+        self.before: Array | None = None
         links = model.links
         spins = [s for s, driven in zip(model.spins, model.driven, strict=True) if driven]
         self.driven = np.array(model.driven, dtype=bool)
@@ -216,9 +218,13 @@ class _Session:
             )  # fmt: skip
         count = len(self.steered)
         if count:
+            before, self.before = self.before, angles[:count] - self.turns[:count]
+            rates = (
+                0.0 * self.before if before is None else (self.before - before) / self.options.step
+            )
             bullet.setJointMotorControlArray(
-                robot, self.steered, bullet.POSITION_CONTROL,
-                targetPositions=angles[:count].tolist(), forces=self.powers,
+                robot, self.steered, bullet.POSITION_CONTROL, targetPositions=self.before.tolist(),
+                targetVelocities=rates.tolist(), forces=self.powers,
             )  # fmt: skip
         if self.forced:
             self.rests[self.commanded] = angles[count:]

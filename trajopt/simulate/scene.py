@@ -1,6 +1,8 @@
 """A scene as engines build it: solids on a plane, plates or a height field.
 
-World frame: x, y level, z up. What no engine can build is refused by name.
+World frame: x, y level, z up. What no engine can build is refused by name. Planes and ramps along
+one line are exact but for a ramp's rounded edges; every other ground is a height field: of the
+smooth surface that plans drive on where its ``area`` is known, else of a map's own triangles.
 """
 
 from __future__ import annotations
@@ -14,8 +16,11 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.simulate.model import Pose, Shape, cylinder, prisms
+from trajopt.world.ground import Ground
 from trajopt.world.height_map import HeightMap
+from trajopt.world.mesh import Mesh
 from trajopt.world.obstacles import Circle, Obstacle, Step
+from trajopt.world.plane import Plane
 from trajopt.world.ramp import Ramps
 from trajopt.world.scene import Scene
 from trajopt.world.terrain import Flat
@@ -23,6 +28,12 @@ from trajopt.world.terrain import Flat
 PLATE = 0.2  # m of solid below a surface, chosen: deeper than any penetration
 BEYOND = 50.0  # m that ramps' plates extend to the sides, before and behind; chosen
 EDGE_PLATES = 8  # across a ramp's rounded edge, chosen: a change of slope in nine small ones
+SPACING = 0.02  # m between heights of a smooth surface, chosen: 0.1 mm off at a radius of 0.5 m
+MOST_POINTS = 250_000  # of a height field; Bullet copies them through Python, chosen
+SURFACE_ERROR = 0.001  # m that a height field may be off the smooth surface, chosen
+AROUND = 3.0  # m around ramps in which they are built where no area is given, chosen
+
+Area = tuple[tuple[float, float], tuple[float, float]]  # lowest and highest x, y, m
 
 
 @dataclass(frozen=True)
@@ -37,17 +48,20 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """What stands in an engine: ``solids``, and a ``plane`` at height 0 or a height ``field``."""
+    """What stands in an engine: ``solids``, and a ``plane`` or a height ``field``, which is
+    ``smooth`` where it follows the surface that plans drive on."""
 
     scene: Scene
     solids: tuple[Solid, ...]
-    plane: bool
+    plane: Plane | None
     field: HeightMap | None
+    smooth: bool
 
     @property
     def broken(self) -> bool:
         """Whether wheels meet faces and bumps, so that the width of a tyre counts."""
-        return self.field is not None or any(isinstance(o, Step) for o in self.scene.obstacles)
+        rough = self.field is not None and not self.smooth
+        return rough or any(isinstance(o, Step) for o in self.scene.obstacles)
 
     @property
     def has_obstacles(self) -> bool:
@@ -55,23 +69,77 @@ class Stage:
 
     def height(self, places: Array) -> Array:
         """Heights (...,) of the ground, without what stands on it, at places (..., 2)."""
-        return np.asarray(self.scene.ground.height(places[..., 0], places[..., 1]))
+        ground = self.field or self.scene.ground
+        return np.asarray(ground.height(places[..., 0], places[..., 1]))
 
 
-def stage(scene: Scene) -> Stage:
-    """Solids for an engine. Raises ArgumentError for a ground that no engine can build."""
-    ground = scene.ground
+def stage(scene: Scene, area: Area | None = None) -> Stage:
+    """Solids for an engine, the ground smooth in ``area``.
+
+    Raises ArgumentError for a ground that no engine can build, or so curved that a height field of
+    that area would be off by more than SURFACE_ERROR.
+    """
     if scene.friction_varies:
         expected = "one coefficient in physics: of a problem, ground.friction = one number"
         raise ArgumentError("scene.friction", "varies", expected)
+    ground, field = scene.ground, None
+    flat = isinstance(ground, Flat) or (isinstance(ground, Ramps) and ground.level)
+    plane = Plane(0.0, 0.0) if flat else None
     plates: tuple[Solid, ...] = ()
-    if isinstance(ground, Ramps):
+    if isinstance(ground, Plane):
+        plane = ground
+    elif plane is not None:
+        pass
+    elif isinstance(ground, Ramps) and _along_one_line(ground):
         plates = tuple(Solid("ground", plate, "ground") for plate in _plates(ground))
-    elif not isinstance(ground, (Flat, HeightMap)):
-        raise ArgumentError("scene.ground", ground, "Flat(), Ramps or a HeightMap in physics")
+    elif isinstance(ground, (HeightMap, Mesh)) and area is None:
+        field = ground if isinstance(ground, HeightMap) else ground.map
+    elif isinstance(ground, Ramps) and area is None:
+        field = _smooth(ground, _around(ground))
+    elif area is not None and hasattr(ground, "partial"):
+        field = _smooth(ground, area)
+    else:
+        expected = "Flat(), a Plane, Ramps, a HeightMap or a Mesh in physics"
+        raise ArgumentError("scene.ground", ground, expected)
     things = tuple(solid for thing in scene.obstacles for solid in _solids(thing, scene))
-    field = ground if isinstance(ground, HeightMap) else None
-    return Stage(scene, plates + things, isinstance(ground, Flat), field)
+    smooth = area is not None or isinstance(ground, Ramps)
+    return Stage(scene, plates + things, plane, field, smooth)
+
+
+def _smooth(ground: Ground, area: Area) -> HeightMap:
+    """Heights of the smooth surface in ``area``, as far as a map reaches."""
+    map_ = ground.map if isinstance(ground, Mesh) else ground
+    low, high = np.array(area)
+    spacing, start = max(SPACING, math.sqrt(np.prod(high - low) / MOST_POINTS)), low
+    if isinstance(map_, HeightMap):  # every point of the map is one of the field's
+        spacing = map_.spacing / math.ceil(map_.spacing / spacing - 1e-9)
+        start = np.array(map_.origin)
+        low, high = np.maximum(low, start), np.minimum(high, start + map_.size)
+    first = np.floor((low - start) / spacing + 1e-9).astype(int)
+    last = np.maximum(np.ceil((high - start) / spacing - 1e-9).astype(int), first + 1)
+    x, y = (start[k] + spacing * np.arange(first[k], last[k] + 1) for k in (0, 1))
+    heights = ground.partial(*np.meshgrid(x, y), 0, 0)
+    field = HeightMap(heights, spacing, (float(x[0]), float(y[0])))
+    middles = np.meshgrid((x[:-1] + x[1:]) / 2.0, (y[:-1] + y[1:]) / 2.0)
+    off = float(np.abs(field.height(*middles) - ground.partial(*middles, 0, 0)).max())
+    if off > SURFACE_ERROR:
+        smaller = f"ground that bends less, or a smaller area: a height field is {off:.2g} m off it"
+        raise ArgumentError("scene.ground", ground, smaller)
+    return field
+
+
+def _around(ground: Ramps) -> Area:
+    """What all ramps rise in, seen from above, and AROUND beside them."""
+    feet = np.array([ramp.place for ramp in ground.ramps])
+    ahead = np.array([(math.cos(r.direction), math.sin(r.direction)) for r in ground.ramps])
+    places = np.vstack([feet, feet + ahead * np.array([[r.run] for r in ground.ramps])])
+    low, high = (places.min(axis=0) - AROUND).tolist(), (places.max(axis=0) + AROUND).tolist()
+    return (low[0], low[1]), (high[0], high[1])
+
+
+def _along_one_line(ground: Ramps) -> bool:
+    turn = [ramp.direction - ground.ramps[0].direction for ramp in ground.ramps]
+    return bool(np.abs(np.sin(turn)).max(initial=0.0) < 1e-9)
 
 
 def _solids(thing: Obstacle, scene: Scene) -> list[Solid]:
@@ -106,16 +174,10 @@ def _is_rectangle(corners: Array) -> bool:
 def _plates(ground: Ramps) -> list[Shape]:
     """Tilted plates, edge to edge, through the ramps' rounded profile: exact where it is straight.
 
-    Convex pieces rather than a mesh, because MuJoCo takes the convex hull of any mesh. Raises
-    ArgumentError where ramps rise in different directions.
+    Convex pieces rather than a mesh, because MuJoCo takes the convex hull of any mesh.
     """
     first = ground.ramps[0]
     turn = np.array([r.direction - first.direction for r in ground.ramps])
-    if np.abs(np.sin(turn)).max() > 1e-9:
-        raise ArgumentError(
-            "ground.ramps", [r.direction for r in ground.ramps],
-            "ramps along one line in physics (directions that differ by 0 or half a turn)",
-        )  # fmt: skip
     along = np.array([math.cos(first.direction), math.sin(first.direction)])
     edges: list[float] = []
     for ramp, sign in zip(ground.ramps, np.sign(np.cos(turn)), strict=True):

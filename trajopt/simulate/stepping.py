@@ -30,8 +30,9 @@ from trajopt.simulate.engine import (
 )
 from trajopt.simulate.measure import observe
 from trajopt.simulate.model import Model, Vector
-from trajopt.simulate.scene import Stage, stage
+from trajopt.simulate.scene import Area, Stage, stage
 from trajopt.simulate.sensors import Sense, exact
+from trajopt.simulate.standing import beyond, standing
 from trajopt.world.scene import Scene
 
 SETTLE, SETTLE_ON_SPRINGS = 0.2, 0.5  # s at rest before the command starts, chosen
@@ -73,12 +74,13 @@ def open_session(
     settle: float | None = None,
     absent: Sequence[str] = (),
     picture: Camera | None = None,
+    area: Area | None = None,
 ) -> Iterator[Session]:
-    """The robot in the scene at ``pose``, at rest after ``settle`` seconds (None: as long as its
-    springs need); obstacles called ``absent`` are out of the world until moved. Raises
-    ArgumentError for a bad ``settle`` or angles of another number, and what ``Engine.open``
-    raises."""
-    stand = stage(scene)
+    """The robot in the scene at ``pose``, in its posture on the ground, at rest after ``settle``
+    seconds (None: as long as its springs need); obstacles called ``absent`` are out of the world
+    until moved. ``area``: see ``scene.stage``. Raises ArgumentError for a bad ``settle`` or angles
+    of another number, and what ``stage`` and ``Engine.open`` raise."""
+    stand = stage(scene, area)
     model = build(robot, discs=stand.broken, outline=stand.has_obstacles)
     if settle is None:
         settle = SETTLE_ON_SPRINGS if model.springs else SETTLE
@@ -93,7 +95,8 @@ def open_session(
         if values is not None and np.shape(values) != (len(links),):
             raise ArgumentError(name, np.shape(values), f"shape ({len(links)},), rad")
         joints |= dict(zip(links, np.zeros(len(links)) if values is None else values, strict=True))
-    start = Start(_standing(model, stand, pose), pose[2], joints)
+    turned = (np.array([joints[k] for k in links]) for links in (model.targets, model.swivels))
+    start = Start(*standing(stand, robot, pose, model.steering(*turned)), joints)
     with engine.open(model, stand, start, picture) as session:
         for name in absent:
             session.move(name, None)
@@ -101,33 +104,6 @@ def open_session(
         for _ in range(round(settle / engine.step)):
             session.advance(held.wheel_speeds, held.angles)
         yield session
-
-
-def _standing(model: Model, stand: Stage, pose: Vector) -> Vector:
-    """Place of the robot frame, as high as the highest ground near a wheel: it falls from there.
-    Raises ArgumentError where a wheel stands beyond a height map."""
-    x, y, yaw = pose
-    cos, sin = math.cos(yaw), math.sin(yaw)
-    feet = np.array([model.frames[foot][0] for foot in model.feet])
-    around = np.array([(0.0, 0.0), (1, 0), (0, 1), (-1, 0), (0, -1)])[:, None, :]
-    near = (feet[:, :2] + around * feet[:, 2:] * float(stand.field is not None)).reshape(-1, 2)
-    turned = near @ np.array([[cos, sin], [-sin, cos]]) + np.array([x, y])
-    beyond = _beyond(stand, turned)
-    if beyond:
-        raise ArgumentError("start pose", pose, f"a start on the height map; {beyond}")
-    return (x, y, float(stand.height(turned).max()))
-
-
-def _beyond(stand: Stage, places: Array) -> str:
-    """Which of places (..., 2) no engine has ground for; empty when all have."""
-    if stand.field is None:
-        return ""
-    low = np.array(stand.field.origin)
-    off = np.any((places < low) | (places > low + np.array(stand.field.size)), axis=-1)
-    if not off.any():
-        return ""
-    x, y = places[off][0]
-    return f"a wheel is at ({x:.3g}, {y:.3g}) m; take a larger map"
 
 
 def interval(session: Session, before: Targets, after: Targets, steps: int) -> None:
@@ -160,9 +136,10 @@ def drive(
     sense: Sense = exact,
     settle: float | None = None,
     picture: Camera | None = None,
+    area: Area | None = None,
 ) -> Recording:
     """Hold still until settled, then execute the command, at most as fast as the motors turn, and
-    record every ``engine.stride`` steps.
+    record every ``engine.stride`` steps. ``area``: see ``scene.stage``.
 
     A ``controller``, told what ``sense`` measures, replaces the command's speeds and angles at
     every record. Raises ArgumentError for a command of another number of wheels or drives, and as
@@ -184,6 +161,7 @@ def drive(
         swivels=command.start_swivels,
         settle=settle,
         picture=picture,
+        area=area,
     ) as session:
         begun = time.perf_counter()
         times, rows, reason = _driven(session, command, chosen, controller, sense)
@@ -259,6 +237,7 @@ def _assembled(
         swivels=column("swivels"),
         loads=column("loads"),
         slip=column("slip"),
+        spin_angles=column("spin_angles"),
         contacts=column("contacts").astype(np.int64),
         hits=_collected(times, rows),
         exploded=bool(reason),
@@ -297,5 +276,5 @@ def explosion(seen: Observation, stand: Stage) -> str:
     lean = math.acos(min(float(seen.rotation[2, 2]), 1.0))
     if lean > MAX_LEAN:
         return f"the robot tipped over at ({seen.position[0]:.3g}, {seen.position[1]:.3g}) m"
-    beyond = _beyond(stand, seen.wheel_places[:, :2])
-    return f"the robot left the height map: {beyond}" if beyond else ""
+    off = beyond(stand, seen.wheel_places[:, :2])
+    return f"the robot left the height map: {off}" if off else ""

@@ -44,6 +44,13 @@ class Plane:
         rise = float(np.tan(self.slope))
         return rise * float(np.cos(self.direction)), rise * float(np.sin(self.direction))
 
+    @property
+    def normal(self) -> tuple[float, float, float]:
+        """Unit vector out of the ground."""
+        x, y = self.gradient
+        size = float(np.sqrt(1.0 + x * x + y * y))
+        return -x / size, -y / size, 1.0 / size
+
     def height(self, x: ArrayLike, y: ArrayLike) -> Array:
         return np.asarray(self.gradient[0] * np.asarray(x) + self.gradient[1] * np.asarray(y))
 

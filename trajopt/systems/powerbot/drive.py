@@ -10,8 +10,9 @@ import numpy as np
 from trajopt.arrays import Array, fold, rotation
 from trajopt.control.tracking import Tracker, TrackingController
 from trajopt.errors import SimulationError
-from trajopt.simulate.check import open_loop, trailing
+from trajopt.simulate.build import build
 from trajopt.simulate.engine import Engine, Recording
+from trajopt.simulate.plan import open_loop
 from trajopt.simulate.stepping import drive
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.scene import Scene
@@ -69,12 +70,13 @@ def drive_plan(
     robot = trajectory.robot
     assert robot is not None  # plans of the thesis have one
     start = shifted(trajectory.at(0.0).pose[0], start_error)
-    command, controller = open_loop(trajectory, start, trailing(trajectory)), None
+    command, controller = open_loop(trajectory, build(robot), start), None
     if tracker is not None:
         controller = TrackingController(trajectory, tracker, robot)
         end = trajectory.duration + tracker.settle
         still = np.zeros((2, len(robot.wheels)))
-        command = replace(command, times=np.array([0.0, end]), wheel_speeds=still)
+        times = np.array([0.0, end])
+        command = replace(command, times=times, wheel_speeds=still, angles=None)
     recording = drive(robot, scene, command, engine=engine, controller=controller)
     if recording.exploded:
         raise SimulationError(recording.reason)

@@ -23,7 +23,7 @@ from trajopt.control.bend import Goal
 from trajopt.errors import ArgumentError
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.problem import Problem
-from trajopt.simulate.check import SAMPLE_TIME
+from trajopt.simulate.plan import SAMPLE_TIME
 from trajopt.simulate.engine import Command, Recording
 from trajopt.simulate.sensors import Sensors
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
