@@ -119,7 +119,11 @@ def test_points_that_coincide_turn_on_the_spot_where_headings_differ():
 BAD = [None, "text", float("nan"), [[1, 2], ["a", 3]], {"x": 1}, object()]
 
 
-@pytest.mark.parametrize("bad", BAD, ids=repr)
+@pytest.mark.parametrize(
+    "bad",
+    BAD,
+    ids=lambda bad: type(bad).__name__ + (str(bad) if isinstance(bad, (str, float)) else ""),
+)
 @pytest.mark.parametrize(
     "argument", ["points", "heading", "knots", "start_direction", "turning_length"]
 )
@@ -131,7 +135,11 @@ def test_bad_arguments_are_named(argument, bad):
         Path.through(given.pop("points"), **given)
 
 
-@pytest.mark.parametrize("bad", [None, "fast", float("nan"), [[1, 2], [3]], object()], ids=repr)
+@pytest.mark.parametrize(
+    "bad",
+    [None, "fast", float("nan"), [[1, 2], [3]], object()],
+    ids=lambda bad: type(bad).__name__ + (str(bad) if isinstance(bad, (str, float)) else ""),
+)
 def test_limits_refuse_what_is_no_number(bad):
     with pytest.raises(ArgumentError):
         Speed(bad)

@@ -15,8 +15,8 @@ from trajopt.errors import ArgumentError, SimulationError
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.robots.robot import Robot
 from trajopt.simulate.build import build
-from trajopt.simulate.engine import Camera, Command, Engine, Hit, Recording
-from trajopt.simulate.plan import WheelPlan, area_of, open_loop, triple, wheel_plan
+from trajopt.simulate.engine import Camera, Engine, Hit, Recording
+from trajopt.simulate.plan import WheelPlan, area_of, open_loop, wheel_plan
 from trajopt.simulate.sensors import Sensors
 from trajopt.simulate.stepping import drive
 from trajopt.timing.trajectory import Trajectory

@@ -136,7 +136,7 @@ class _Session:
         """What servos are told: as far ahead of ``angles`` as they lag behind what turns evenly."""
         before = angles if self.before is None else self.before
         self.before = angles.copy()
-        return angles - self.turns + self.lag * (angles - before)
+        return np.asarray(angles - self.turns + self.lag * (angles - before))
 
     def base(self) -> Motion:
         """See ``engine.Session``."""

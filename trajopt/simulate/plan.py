@@ -8,9 +8,9 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.limits.forces import contact_loads
+from trajopt.simulate.engine import Command
 from trajopt.simulate.model import Model
 from trajopt.simulate.scene import Area
-from trajopt.simulate.engine import Command
 from trajopt.timing.trajectory import Trajectory
 
 SAMPLE_TIME = 0.002  # s between wheel speed commands: the engines' own step

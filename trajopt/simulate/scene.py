@@ -117,15 +117,22 @@ def _smooth(ground: Ground, area: Area) -> HeightMap:
         low, high = np.maximum(low, start), np.minimum(high, start + map_.size)
     first = np.floor((low - start) / spacing + 1e-9).astype(int)
     last = np.maximum(np.ceil((high - start) / spacing - 1e-9).astype(int), first + 1)
-    x, y = (start[k] + spacing * np.arange(first[k], last[k] + 1) for k in (0, 1))
-    heights = ground.partial(*np.meshgrid(x, y), 0, 0)
+    x, y = (float(start[k]) + spacing * np.arange(first[k], last[k] + 1) for k in (0, 1))
+    heights = _height(ground, x, y)
     field = HeightMap(heights, spacing, (float(x[0]), float(y[0])))
-    middles = np.meshgrid((x[:-1] + x[1:]) / 2.0, (y[:-1] + y[1:]) / 2.0)
-    off = float(np.abs(field.height(*middles) - ground.partial(*middles, 0, 0)).max())
+    between = (x[:-1] + x[1:]) / 2.0, (y[:-1] + y[1:]) / 2.0
+    columns, rows = np.meshgrid(*between)
+    off = float(np.abs(field.height(columns, rows) - _height(ground, *between)).max())
     if off > SURFACE_ERROR:
         smaller = f"ground that bends less, or a smaller area: a height field is {off:.2g} m off it"
         raise ArgumentError("scene.ground", ground, smaller)
     return field
+
+
+def _height(ground: Ground, x: Array, y: Array) -> Array:
+    """Heights of the smooth surface on a grid of places x by y."""
+    columns, rows = np.meshgrid(x, y)
+    return ground.partial(columns, rows, 0, 0)
 
 
 def _around(ground: Ramps) -> Area:

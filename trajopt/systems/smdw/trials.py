@@ -23,8 +23,8 @@ from trajopt.control.bend import Goal
 from trajopt.errors import ArgumentError
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.problem import Problem
-from trajopt.simulate.plan import SAMPLE_TIME
 from trajopt.simulate.engine import Command, Recording
+from trajopt.simulate.plan import SAMPLE_TIME
 from trajopt.simulate.sensors import Sensors
 from trajopt.systems.smdw.approach_run import Ending, ending_of, run_controlled
 from trajopt.systems.smdw.climb import (
