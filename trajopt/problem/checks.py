@@ -11,6 +11,7 @@ import numpy as np
 
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.problem.extensions import SECTIONS, entry
+from trajopt.robots.start import start_angles
 from trajopt.robots.steering import steering_of
 from trajopt.schema import broken_rule
 
@@ -41,7 +42,7 @@ def _wheels(problem: Problem) -> None:
             expected = f"{len(names)} angles, one a wheel that rolls ({', '.join(names)})"
             raise broken_rule(f"{section}.wheels", list(wheels), expected)
     try:
-        steering_of(problem.robot).start_angles(problem.start_steering)
+        start_angles(steering_of(problem.robot), problem.start_steering)
     except ArgumentError as error:
         raise broken_rule("start.steering", problem.start_steering, error.expected) from None
     for name in problem.critical:

@@ -8,28 +8,22 @@ of path parameter), t the wheel's rolling direction and n the axle's, to its lef
     castor          beta' = v.n / trail - w
     spin            r phi' = v.t - lateral (w + beta')
 
-A castor's equation is solved along the path. In z = exp(i (angle + beta)), with v a complex number,
-it is Riccati's, z' = (v - conj(v) z^2) / (2 trail) - i w z, so a stretch of path acts on z as a
-Moebius map of SU(1,1): z -> (a z + b) / (conj(b) z + conj(a)), which the sixth-order Magnus
-expansion gives for all stretches at once.
+A castor's equation is solved along the path, see ``robots/swivel.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from trajopt.arrays import Array, BoolArray, IndexArray
-from trajopt.errors import ArgumentError
 from trajopt.robots.robot import Robot
 
-Complex = np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
-
 _STILL = 1e-9  # of a wheel's largest velocity per path parameter: slower, its pivot stands still
+_NEAR = 1e-5  # m of path before and after a pivot's turning back; chosen
+_NOISE = 1e-12  # relative, of cross products; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,24 +132,43 @@ class Steering:
         vx = twist[:, :1] - twist[:, 2:] * y
         return np.stack([vx, twist[:, 1:2] + twist[:, 2:] * x], axis=2)
 
-    def headings(self, twist: Array, *, groups: bool = False) -> tuple[Array, BoolArray]:
-        """(N, S): steering angles of the steered wheels, or (N, G) of groups, modulo pi, and where
-        the place that sets them stands still, so that any angle does."""
+    def headings(self, *motion: Array, groups: bool = False) -> tuple[Array, BoolArray]:
+        """(N, S): steering angles of the steered wheels, or (N, G) of groups, modulo pi, at twists
+        (N, 3) whose first and second derivatives may be given too; and where the place that sets
+        them stands still with all that is given, so that any angle does."""
         at = self.steered
         place, angle = self.steering_place[at], self.angle[at]
         if groups:
             place, angle = self.group_place, self.group_angle
-        v = self.velocities(twist, place)
-        speed = np.hypot(v[..., 0], v[..., 1])
-        still = speed <= _STILL * float(np.abs(twist).max(initial=0.0))
-        return np.arctan2(v[..., 1], v[..., 0]) - angle, still
+        found = np.zeros((len(motion[0]), len(place)))
+        still = np.ones(found.shape, dtype=bool)
+        for twist in motion:  # where a place stands still, it sets off along the next derivative
+            v, moves = self._moving(twist, place)
+            found = np.where(still & moves, np.arctan2(v[..., 1], v[..., 0]) - angle, found)
+            still &= ~moves
+        return found, still
 
-    def group_rates(
-        self, twist: Array, twist_rate: Array, twist_bend: Array
+    def _moving(self, twist: Array, place: Array) -> tuple[Array, BoolArray]:
+        """Velocities of places (N, P, 2), or a derivative, and where it is not zero (N, P)."""
+        v = self.velocities(twist, place)
+        return v, np.hypot(v[..., 0], v[..., 1]) > _STILL * np.abs(twist).max(initial=0.0)
+
+    def turning_rates(
+        self, place: Array, twist: Array, twist_rate: Array, twist_bend: Array
     ) -> tuple[Array, Array]:
-        """(N, G): first and second derivative of the groups' angles along the path parameter."""
-        parts = (self.velocities(m, self.group_place) for m in (twist, twist_rate, twist_bend))
-        return _direction_rates(*parts)
+        """(N, P): first and second derivative along the path parameter of the directions in which
+        places (P, 2) move. Where a place comes to rest and turns back, the limit of the first; the
+        second is 0 there, and both where it rests on."""
+        (v, moves), (v1, turns) = self._moving(twist, place), self._moving(twist_rate, place)
+        v2, bent = self.velocities(twist_bend, place), _cross(v, v1)
+        size, size1 = np.hypot(v[..., 0], v[..., 1]), np.hypot(v1[..., 0], v1[..., 1])
+        # next to the turning back, cross products are rounding
+        noise = _NOISE * np.abs(twist).max(initial=0.0) * size1
+        moves &= (size > _NEAR * size1) | (np.abs(bent) > noise)
+        square, square1 = np.where(moves, size**2, 1.0), np.where(turns, size1**2, np.inf)
+        rate = np.where(moves, bent / square, _cross(v1, v2) / (2 * square1))
+        bend = (_cross(v, v2) - 2 * rate * np.sum(v * v1, axis=2)) / square
+        return rate, np.where(moves, bend, 0.0)
 
     def states(
         self, twist: Array, twist_rate: Array, twist_bend: Array | None, steering: Array
@@ -169,12 +182,10 @@ class Steering:
         rate, bend = np.zeros(shape), np.zeros(shape)
         if len(self.steered):
             assert twist_bend is not None
-            v, v1, v2 = (
-                self.velocities(m, self.steering_place[self.steered])
-                for m in (twist, twist_rate, twist_bend)
-            )
-            rate[:, self.steered], bend[:, self.steered] = _direction_rates(v, v1, v2)
-            group_rate, group_bend = self.group_rates(twist, twist_rate, twist_bend)
+            motion = twist, twist_rate, twist_bend
+            place = self.steering_place[self.steered]
+            rate[:, self.steered], bend[:, self.steered] = self.turning_rates(place, *motion)
+            group_rate, group_bend = self.turning_rates(self.group_place, *motion)
         v, v1 = self.velocities(twist, self.place), self.velocities(twist_rate, self.place)
         angle = self.angle + steering
         t = np.stack([np.cos(angle), np.sin(angle)], axis=2)
@@ -218,24 +229,6 @@ class Steering:
         none, contacts = np.zeros((len(twist), 0)), np.broadcast_to(self.place, (*shape, 2))
         return WheelStates(zero, zero, zero, spin, spin_rate, none, none, contacts)
 
-    def start_angles(self, given: Mapping[str, float]) -> dict[int, float]:
-        """Checked start angles by wheel; castors of one pivot share one. Raises ArgumentError."""
-        found: dict[int, float] = {}
-        turning = [self.names[i] for i in (*self.steered, *self.castors)]
-        for name, angle in given.items():
-            if name not in turning or not np.isfinite(angle):
-                expected = f"finite angles, rad, of wheels among {', '.join(turning) or 'none'}"
-                raise ArgumentError(f"start_steering['{name}']", angle, expected)
-            found[self.names.index(name)] = float(angle)
-        for pivot in self.robot.description.pivots:
-            members = [self.names.index(name) for name in pivot.wheels]
-            angles = {found[i] for i in members if i in found}
-            if len(angles) > 1:
-                expected = f"one angle for the pivot '{pivot.name}'"
-                raise ArgumentError("start_steering", sorted(angles), expected)
-            found.update({i: next(iter(angles)) for i in members if angles})
-        return found
-
 
 @lru_cache(maxsize=64)
 def steering_of(robot: Robot) -> Steering:
@@ -243,81 +236,5 @@ def steering_of(robot: Robot) -> Steering:
     return Steering(robot)
 
 
-def _direction_rates(v: Array, v1: Array, v2: Array) -> tuple[Array, Array]:
-    """First and second derivative of the direction of v (N, S, 2), whose own are v1 and v2; where v
-    is zero, the limits, the second taken as zero."""
-
-    def cross(a: Array, b: Array) -> Array:
-        return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
-
-    square, square1 = np.sum(v * v, axis=2), np.sum(v1 * v1, axis=2)
-    still = square <= (_STILL * np.max(square + square1, initial=0.0)) ** 2
-    safe, safe1 = np.where(still, 1.0, square), np.where(square1 > 0, square1, 1.0)
-    rate = np.where(still, cross(v1, v2) / (2 * safe1), cross(v, v1) / safe)
-    bend = np.where(still, 0.0, (cross(v, v2) - 2 * rate * np.sum(v * v1, axis=2)) / safe)
-    return rate, bend
-
-
-class _Turn(NamedTuple):
-    """Matrices [[i p, q], [conj(q), -i p]] of su(1,1), arrays (M, C)."""
-
-    p: Array
-    q: Complex
-
-    def __add__(self, other: tuple[Any, ...]) -> _Turn:
-        return _Turn(self.p + other[0], self.q + other[1])
-
-    def __sub__(self, other: _Turn) -> _Turn:
-        return _Turn(self.p - other.p, self.q - other.q)
-
-    def __mul__(self, factor: Any) -> _Turn:
-        return _Turn(self.p * factor, self.q * factor)
-
-    def with_(self, other: _Turn) -> _Turn:
-        """The commutator."""
-        p, q = self
-        return _Turn(2 * np.imag(q * np.conj(other.q)), 2j * (p * other.q - other.p * q))
-
-
-@dataclass(frozen=True, eq=False)
-class Swivel:
-    """Moebius maps z -> (a z + b) / (conj(b) z + conj(a)) of M stretches of path for C castors."""
-
-    a: Complex  # (M, C)
-    b: Complex  # (M, C)
-
-    @classmethod
-    def of(cls, v: Complex, w: Array, length: Array, trail: Array) -> Swivel:
-        """From pivot velocities v (M, 3, C) and yaw rates w (M, 3) at the three Gauss points of
-        each stretch, per unit of its length (M,); trail (C,), m."""
-        h = length[:, None]
-        first, middle, last = (
-            _Turn(-w[:, i, None] / 2 + np.zeros(trail.shape), v[:, i] / (2 * trail))
-            for i in range(3)
-        )
-        a1 = middle * h
-        a2 = (last - first) * (np.sqrt(15.0) / 3 * h)
-        a3 = (last - middle * 2 + first) * (10 / 3 * h)
-        c1 = a1.with_(a2)
-        c2 = a1.with_(a3 * 2 + c1) * (-1 / 60)
-        p, q = a1 + a3 * (1 / 12) + (a1 * -20 - a3 + c1).with_(a2 + c2) * (1 / 240)
-        square = np.abs(q) ** 2 - p**2
-        root = np.sqrt(np.abs(square))
-        small = root < 1e-8
-        safe = np.where(small, 1.0, root)
-        c = np.where(square >= 0, np.cosh(root), np.cos(root))
-        s = np.where(small, 1.0, np.where(square >= 0, np.sinh(safe), np.sin(safe)) / safe)
-        return cls(c + 1j * p * s, q * s)
-
-    def follow(self, angle: Array) -> Array:
-        """(M+1, C): castors' directions, rad, continuous, from ``angle`` (C,) on."""
-        z, first = np.empty((len(self.a) + 1, self.a.shape[1]), dtype=complex), np.exp(1j * angle)
-        for k in range(self.a.shape[1]):
-            at, column = complex(first[k]), [complex(first[k])]
-            for a, b in zip(self.a[:, k].tolist(), self.b[:, k].tolist(), strict=True):
-                at = (a * at + b) / (b.conjugate() * at + a.conjugate())
-                at /= abs(at)
-                column.append(at)
-            z[:, k] = column
-        turned = np.angle(z[1:] * np.conj(z[:-1]))
-        return np.vstack([angle, angle + np.cumsum(turned, axis=0)])
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -6,11 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+
 from trajopt.arrays import Array
+from trajopt.errors import ArgumentError
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples, sample_at
 from trajopt.robots.robot import Robot
-from trajopt.robots.steering import WheelStates, steering_of
+from trajopt.robots.start import start_angles
+from trajopt.robots.steering import Steering, WheelStates, steering_of
 from trajopt.timing.turning import Turning, turning_along
 from trajopt.timing.wheels import WheelTable, wheel_table
 from trajopt.world.ground import Ground
@@ -23,12 +27,14 @@ from trajopt.world.terrain import Flat
 class Track:
     """``path`` lies on ``ground`` (see ``track``). ``start_steering``: angles (rad) by wheel at the
     start of the path, of castors and steered wheels; castors that are not named start as the file
-    draws them, steered wheels as the path begins."""
+    draws them, steered wheels as the path begins. ``rests`` (R,): spline parameters where the robot
+    rests, so that steered wheels may turn."""
 
     path: Path
     robot: Robot | None
     ground: Ground
     start_steering: Mapping[str, float] = field(default_factory=dict)
+    rests: Array = field(default_factory=lambda: np.zeros(0))
 
     def samples(self, s: Array, u: Array) -> PathSamples:
         """Geometry and wheel states at spline parameters (N,) whose path parameters are known."""
@@ -39,7 +45,7 @@ class Track:
 
     def motion(self, s: Array, u: Array) -> tuple[PathSamples, Array | None]:
         """Samples without wheel states, and the second derivative of the twist where it counts."""
-        if self.robot is not None and len(steering_of(self.robot).steered):
+        if self.steers:
             frame = frame_on(self.ground, self.path, u, self._contacts, 4)
             return samples_of(frame, s, u), twist_bend(frame)
         if self.ground.level:
@@ -47,18 +53,28 @@ class Track:
         return samples_on(self.ground, self.path, s, u, self._contacts), None
 
     def _states(self, samples: PathSamples, bend: Array | None) -> WheelStates:
-        assert self.robot is not None
-        steering = steering_of(self.robot)
+        steering = self.steering
         if not steering.turns:
             return steering.rigid(samples.twist, samples.twist_rate)
-        angles = self.turning.at(samples.s, samples.u, samples.twist)
+        angles = self.turning.at(samples, bend)
         return steering.states(samples.twist, samples.twist_rate, bend, angles)
+
+    @property
+    def steering(self) -> Steering:
+        """The robot's wheels as arrays."""
+        assert self.robot is not None
+        return steering_of(self.robot)
+
+    @property
+    def steers(self) -> bool:
+        """Whether a robot drives here, and steers."""
+        return self.robot is not None and len(self.steering.steered) > 0
 
     @property
     def _contacts(self) -> Array | None:
         """(K, 2): where wheels stand when the posture is that of wheels on the ground, castors at
         their pivots."""
-        return None if self.robot is None else steering_of(self.robot).place
+        return None if self.robot is None else self.steering.place
 
     @cached_property
     def turning(self) -> Turning:
@@ -67,16 +83,14 @@ class Track:
         Raises ArgumentError for a start angle that no wheel can have, InfeasibleError with place
         where a wheel cannot steer as the path needs.
         """
-        assert self.robot is not None
-        steering = steering_of(self.robot)
-        start = steering.start_angles(self.start_steering)
-        return turning_along(self.path, steering, self.motion, start)
+        steering = self.steering
+        start = start_angles(steering, self.start_steering)
+        return turning_along(self.path, steering, self.motion, start, self.rests)
 
     @cached_property
     def wheels(self) -> WheelTable:
         """Spin angles of all wheels along the path."""
-        assert self.robot is not None
-        return wheel_table(self.path, steering_of(self.robot), self.motion, self.turning)
+        return wheel_table(self.path, self.steering, self.motion, self.turning)
 
 
 def track(
@@ -88,8 +102,16 @@ def track(
     """The track along a plane path laid on ``ground``, or a path in space that lies on it. Without
     ground, or with ``Flat``, the path itself is the ground.
 
-    Raises InfeasibleError where the path does not lie on the ground, or cannot be driven there.
+    Raises InfeasibleError where the path does not lie on the ground, or cannot be driven there, and
+    ArgumentError for start angles that no wheel can have.
     """
+    given = {} if start_steering is None else start_steering
+    if not isinstance(given, Mapping):
+        raise ArgumentError("start_steering", given, "angles, rad, by name of the wheel")
+    if given and robot is None:
+        raise ArgumentError("start_steering", dict(given), "a robot whose wheels those are")
+    if given and robot is not None:
+        start_angles(steering_of(robot), given)
     shape: Ground = Flat() if ground is None else ground
     if isinstance(path, LaidPath) and (ground is None or path.ground is ground):
         assert path.ground is not None
@@ -98,4 +120,4 @@ def track(
         shape.check(path)
     else:
         path = lay(path, shape)
-    return Track(path, robot, shape, dict(start_steering or {}))
+    return Track(path, robot, shape, dict(given))

@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, IndexArray
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.robots.steering import steering_of
+from trajopt.timing.rests import Rest, rests_of
 from trajopt.timing.stages import Check, check, fine_rows
 from trajopt.timing.track import Track
 from trajopt.world.ground import Ground
@@ -84,10 +85,29 @@ class Trajectory:
 
     @cached_property
     def times(self) -> Array:
-        """(N+1,): times at the gridpoints, s."""
-        return np.concatenate(
+        """(N+1,): times at which the robot leaves the gridpoints, s."""
+        moving = np.concatenate(
             [[0.0], np.cumsum(2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:]))]
         )
+        return np.asarray(moving + np.cumsum(self.waits))
+
+    @cached_property
+    def rests(self) -> tuple[Rest, ...]:
+        """Where steered wheels turn while the robot rests."""
+        return rests_of(self.track, self.limits)
+
+    @cached_property
+    def waits(self) -> Array:
+        """(N+1,): how long the robot rests at the gridpoints, s, while wheels turn."""
+        found = np.zeros(len(self.u))
+        for node, rest in self._resting.items():
+            found[node] = rest.duration
+        return found
+
+    @cached_property
+    def _resting(self) -> dict[int, Rest]:
+        """The rests by gridpoint."""
+        return {int(np.argmin(np.abs(self.u - rest.u))): rest for rest in self.rests}
 
     @property
     def duration(self) -> float:
@@ -97,21 +117,35 @@ class Trajectory:
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,
         duration]."""
+        i, after, node, _ = self._placed(t)
+        s = self.s[i] + after * (self.sd[i] + after * self.sdd[i] / 2)
+        speed = np.maximum(self.sd[i] + self.sdd[i] * after, 0.0)
+        waits = node >= 0
+        speed, sdd = np.where(waits, 0.0, speed), np.where(waits, 0.0, self.sdd[i])
+        return np.clip(s, self.s[i], self.s[i + 1]), speed, sdd
+
+    def _placed(self, t: ArrayLike) -> tuple[IndexArray, Array, IndexArray, Array]:
+        """At times t (N,): which interval between gridpoints and the time since it was entered; the
+        gridpoint at which the robot waits, -1 while it moves, and the time since it came to rest
+        there."""
         time = np.atleast_1d(np.asarray(t, dtype=np.float64))
         slack = _ON_TIME * self.duration
         if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
             raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
         i = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.sdd) - 1)
         after = np.clip(time - self.times[i], 0.0, None)
-        s = self.s[i] + after * (self.sd[i] + after * self.sdd[i] / 2)
-        speed = np.maximum(self.sd[i] + self.sdd[i] * after, 0.0)
-        return np.clip(s, self.s[i], self.s[i + 1]), speed, self.sdd[i]
+        node = np.where(time < self.times[0], 0, i + 1)
+        since = time - (self.times[node] - self.waits[node])
+        waits = (self.waits[node] > 0) & (since >= 0)
+        return i, after, np.where(waits, node, -1), since
 
     def at(self, t: ArrayLike) -> State:
         """State at times t (N,) or one time (N = 1), s. Raises ArgumentError outside [0,
         duration]."""
-        s, speed, _ = self.along(t)
-        u = self.path.locate(s)
+        (i, _, node, since), (s, speed, _) = self._placed(t), self.along(t)
+        inside = np.where(i + 2 < len(self.u), np.nextafter(self.u[i + 1], -np.inf), self.u[-1])
+        u = np.clip(self.path.locate(s), self.u[i], inside)
+        u = np.where(node >= 0, self.u[node], u)
         samples = self.track.samples(s, u)
         table_u, table_yaw = self._yaw_table
         turns = np.round((np.interp(u, table_u, table_yaw) - samples.yaw) / (2 * np.pi))
@@ -124,6 +158,10 @@ class Trajectory:
         rolling, wheels = steering_of(self.robot).rolling, samples.wheels
         angles, rates = self.track.wheels.at(u), wheels.spin * speed[:, None]
         angles[:, rolling] += self.start_wheels
+        turned, turning = wheels.steering.copy(), wheels.steering_rate * speed[:, None]
+        for gridpoint, rest in self._resting.items():
+            ahead, turning[node == gridpoint] = rest.ahead(since[node == gridpoint])
+            turned[node == gridpoint] -= ahead
         return State(
             pose,
             twist,
@@ -132,8 +170,8 @@ class Trajectory:
             *place,
             angles,
             rates,
-            wheels.steering,
-            wheels.steering_rate * speed[:, None],
+            turned,
+            turning,
         )
 
     def margins(self) -> Mapping[str, float]:
@@ -173,7 +211,8 @@ class Trajectory:
     @cached_property
     def track(self) -> Track:
         """The path on its ground, with the robot's wheel states along it."""
-        return Track(self.path, self.robot, self.ground, self.start_steering)
+        rests = self.u[self.sd == 0]
+        return Track(self.path, self.robot, self.ground, self.start_steering, rests)
 
     @cached_property
     def _yaw_table(self) -> tuple[Array, Array]:

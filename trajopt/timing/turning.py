@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.arrays import Array, BoolArray
-from trajopt.errors import InfeasibleError
+from trajopt.arrays import Array
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples
-from trajopt.robots.steering import Steering, Swivel
-
-Motion = Callable[[Array, Array], tuple[PathSamples, Array | None]]
+from trajopt.robots.steering import Steering
+from trajopt.robots.swivel import Swivel
+from trajopt.timing.steered import Motion, Turn, cells, steered_along
 
 _GAUSS = 0.5 + np.array([-1.0, 0.0, 1.0]) * np.sqrt(15.0) / 10
 _SWIVEL = 1e-7  # rad by which castor angles may change when cells are halved a last time; chosen
 _STEP = 0.5  # trails that a castor's pivot goes in a first cell, at most; chosen
 _ROUNDS = 14  # of halving cells; chosen
-_SWING = 0.3  # rad that a steered wheel turns between two places of its table, at most; chosen
-_SHORTEST = 1e-9  # share of the path below which a cell is a place
-_FITS = 1e-6  # rad between a given start angle and the path's; chosen
 
 
 @dataclass(frozen=True, eq=False)
 class Turning:
     """Castors' angles (M, C), first and second derivatives along s at both ends of every cell (M-1,
     2, C), at places s (M,); steered wheels' angles (P, S) at spline parameters u (P,), which tell
-    one half turn from the next."""
+    one half turn from the next; and how they turn where the robot rests."""
 
     steering: Steering
     s: Array
@@ -37,15 +33,18 @@ class Turning:
     castor_bend: Array
     u: Array
     steered: Array
+    turns: tuple[Turn, ...] = ()
 
-    def at(self, s: Array, u: Array, twist: Array) -> Array:
-        """(N, K): steering angles of all wheels, rad, at path parameters whose twist (N, 3) is
-        known."""
+    def at(self, samples: PathSamples, bend: Array | None) -> Array:
+        """(N, K): steering angles of all wheels, rad, at samples and the second derivative of their
+        twist (needed where wheels are steered)."""
+        s, u = samples.s, samples.u
         found = np.zeros((len(s), len(self.steering.names)))
         if len(self.steering.castors):
             found[:, self.steering.castors] = self._castors(s)
         if len(self.steering.steered):
-            angle, still = self.steering.headings(twist)
+            assert bend is not None
+            angle, still = self.steering.headings(samples.twist, samples.twist_rate, bend)
             near = np.stack([np.interp(u, self.u, column) for column in self.steered.T], axis=1)
             turned = angle + np.pi * np.round((near - angle) / np.pi)
             found[:, self.steering.steered] = np.where(still, near, turned)
@@ -70,17 +69,19 @@ class Turning:
 
 
 def turning_along(
-    path: Path, steering: Steering, motion: Motion, start: Mapping[int, float]
+    path: Path, steering: Steering, motion: Motion, start: Mapping[int, float], rests: Array
 ) -> Turning:
-    """Solved along the whole path; ``start`` angles by wheel, rad."""
+    """Solved along the whole path; ``start`` angles by wheel, rad; ``rests``: spline parameters where
+    the robot rests."""
     none = np.zeros((0, 0))
+    turns: tuple[Turn, ...] = ()
     u, steered = np.zeros(0), none
     if len(steering.steered):
-        u, steered = _steered(path, steering, motion, start)
+        u, steered, turns = steered_along(path, steering, motion, start, rests)
     if not len(steering.castors):
-        return Turning(steering, np.zeros(0), none, none, none, u, steered)
+        return Turning(steering, np.zeros(0), none, none, none, u, steered, turns)
     s, castor, rate, bend = _castors(path, steering, motion, start)
-    return Turning(steering, s, castor, rate, bend, u, steered)
+    return Turning(steering, s, castor, rate, bend, u, steered, turns)
 
 
 def _castors(
@@ -90,9 +91,8 @@ def _castors(
     at = steering.castors
     trail = steering.trail[at]
     first = np.array([start.get(int(i), 0.0) for i in at])
-    knots = np.asarray(path.basis.knots)
     count = np.ceil(np.diff(path.knot_parameters) / (_STEP * trail.min())).astype(int)
-    u = _divided(knots, np.maximum(count, 4))
+    u = cells(path, np.maximum(count, 4))
     known: Turning | None = None
     for _ in range(_ROUNDS):
         s = path.parameter(u)
@@ -134,116 +134,3 @@ def _castor_rates(
     rate, bend = steering.castor_rates(samples.twist, samples.twist_rate, angles)
     shape = (len(u) - 1, 2, len(steering.castors))
     return rate.reshape(shape), bend.reshape(shape)
-
-
-def _steered(
-    path: Path, steering: Steering, motion: Motion, start: Mapping[int, float]
-) -> tuple[Array, Array]:
-    """Continuous angles of steered wheels, on places close enough to tell half turns. Raises
-    InfeasibleError."""
-    knots = np.asarray(path.basis.knots)
-    u = _divided(knots, np.full(len(knots) - 1, 16))
-    for _ in range(2 * _ROUNDS):
-        samples, _ = motion(path.parameter(u), u)
-        wheels, still = steering.headings(samples.twist)
-        groups, still_groups = steering.headings(samples.twist, groups=True)
-        raw, rests = np.hstack([wheels, groups]), np.hstack([still, still_groups])
-        swing = _swings(raw, rests)
-        wide = (swing > _SWING).any(axis=1) & (np.diff(u) > _SHORTEST * (path.end - path.start))
-        if not wide.any():
-            break
-        u = np.sort(np.concatenate([u, ((u[:-1] + u[1:]) / 2)[wide]]))
-    names = [steering.names[i] for i in steering.steered]
-    s, count = samples.s, len(names)
-    jump = (swing > _SWING).any(axis=1)
-    if jump.any():
-        k = int(np.argmax(jump))
-        worst = int(np.argmax(swing[k, :count])) if count else 0
-        raise InfeasibleError(
-            "steering",
-            float(s[k]),
-            f"wheel '{names[worst]}' stands still here and must turn by "
-            f"{np.degrees(swing[k].max()):.3g} deg before the path goes on; lead the path around, or "
-            "split it here",
-        )
-    table = np.unwrap(_held(raw, rests), axis=0, period=np.pi)
-    shift = _first_branch(steering, table[0], start)
-    table = table + shift
-    _require_range(steering, table[:, count:], samples)
-    return u, table[:, :count]
-
-
-def _held(angle: Array, still: BoolArray) -> Array:
-    """Angles (P, S) where a wheel that stands still keeps its last one, or takes its first."""
-    found = angle.copy()
-    for k in range(angle.shape[1]):
-        moving = np.flatnonzero(~still[:, k])
-        if len(moving):
-            at = np.clip(np.searchsorted(moving, np.arange(len(angle)), side="right") - 1, 0, None)
-            found[:, k] = angle[moving[at], k]
-    return found
-
-
-def _swings(angle: Array, still: BoolArray) -> Array:
-    """(P-1, S): how far each wheel turns from place to place, modulo half turns, rad."""
-    change = np.diff(_held(angle, still), axis=0)
-    return np.abs(change - np.pi * np.round(change / np.pi))
-
-
-def _first_branch(steering: Steering, first: Array, start: Mapping[int, float]) -> Array:
-    """(S + G,): multiples of pi that take the first angles of wheels, then of groups, to where they
-    start: nearest to 0 or to the angle given, inside the range."""
-    count = len(steering.steered)
-    place = {int(i): k for k, i in enumerate(steering.steered)}
-    shift = np.zeros(len(first))
-    for g, members in enumerate(steering.groups):
-        mine = [place[int(i)] for i in members]
-        wanted = next((start[int(i)] for i in members if int(i) in start), 0.0)
-        low, high = steering.ranges[g]
-        turns = np.pi * (np.arange(-3, 4) + np.round((wanted - first[count + g]) / np.pi))
-        angles = first[count + g] + turns
-        inside = (angles >= low - _FITS) & (angles <= high + _FITS)
-        away = np.abs(angles - wanted) + np.where(inside, 0.0, 100.0)
-        shift[count + g] = turns[int(np.argmin(away))]
-        for k in mine:
-            shift[k] = np.pi * np.round((first[count + g] + shift[count + g] - first[k]) / np.pi)
-        for i, k in zip(members, mine, strict=True):
-            given, found = start.get(int(i)), first[k] + shift[k]
-            if given is not None and abs(given - found) > _FITS:
-                raise InfeasibleError(
-                    "steering",
-                    0.0,
-                    f"wheel '{steering.names[i]}' starts at {given:.6g} rad, the path begins with it "
-                    f"at {found:.6g} rad: turn it first",
-                )
-    return shift
-
-
-def _require_range(steering: Steering, angles: Array, samples: PathSamples) -> None:
-    """Raises InfeasibleError, with place and the radius that would do, where a group must turn
-    beyond its range."""
-    low, high = steering.ranges.T
-    beyond = np.maximum(angles - high, low - angles)
-    if not len(beyond) or beyond.max(initial=0.0) <= _FITS:
-        return
-    k, g = (int(i) for i in np.unravel_index(int(np.argmax(beyond)), beyond.shape))
-    first = int(np.argmax(beyond[:, g] > _FITS))
-    name, angle = steering.robot.description.steering[g].name, float(angles[k, g])
-    bound = float(high[g] if angle > high[g] else low[g])
-    reason = f"steering '{name}' must turn to {angle:.4g} rad, its range ends at {bound:.4g} rad"
-    if steering.robot.drivable.shape[1] == 2 and samples.twist[k, 0] > 0:
-        x, y = steering.group_place[g]
-        tangent = np.tan(bound + steering.group_angle[g])
-        radius = abs((x + y * tangent) / tangent) if tangent else np.inf
-        there = abs(1 / samples.twist[k, 2])
-        reason += f"; the path's radius is {there:.3g} m, {radius:.3g} m would do"
-    raise InfeasibleError("steering", float(samples.s[first if first else k]), reason)
-
-
-def _divided(knots: Array, cells: Array) -> Array:
-    """Knots with every interval cut into so many equal cells."""
-    parts = [
-        np.linspace(a, b, n, endpoint=False)
-        for a, b, n in zip(knots[:-1], knots[1:], cells.tolist(), strict=True)
-    ]
-    return np.append(np.concatenate(parts), knots[-1])

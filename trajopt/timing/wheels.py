@@ -9,7 +9,8 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.paths.path import Path
 from trajopt.robots.steering import Steering
-from trajopt.timing.turning import Motion, Turning
+from trajopt.timing.steered import Motion
+from trajopt.timing.turning import Turning
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
 _FIRST_CELLS, _MOST_CELLS = (
@@ -45,7 +46,7 @@ class WheelTable:
         s = self.path.parameter(u) if turns else np.zeros(len(u))
         samples, bend = self.motion(s, u)
         if turns:
-            angle = self.turning.at(s, u, samples.twist)
+            angle = self.turning.at(samples, bend)
             states = self.steering.states(samples.twist, samples.twist_rate, bend, angle)
         else:
             states = self.steering.rigid(samples.twist, samples.twist_rate)
