@@ -221,6 +221,11 @@ class Model:
         return np.array([link.joint.role == "roller" for link in self.links])
 
     @cached_property
+    def parents(self) -> IntArray:
+        """(links,)."""
+        return np.array([link.parent for link in self.links])
+
+    @cached_property
     def wheel_of(self) -> IntArray:
         """(links,): the wheel of the file that a link belongs to, -1: none."""
         return np.array([link.wheel for link in self.links])

@@ -32,9 +32,12 @@ MAX_JOINTS = 121
 # Bullet stops joints at 100 rad/s unless told otherwise; a roller of 9.5 mm turns at 124 rad/s in
 # lateral motion at 3 km/h [rad/s].
 MAX_JOINT_SPEED = 1e4
-# Tyres on smooth ground give way by this much under the robot's weight, m, at this share of
-# critical damping, chosen: contacts that are equally soft share the load as the limits assume
-TYRE_SAG, TYRE_DAMPING = 0.001, 0.8
+# Tyres and rollers on smooth ground give way by this much under the robot's weight, m, at these
+# shares of critical damping, chosen: contacts that are equally soft share the load as the limits
+# assume. Hard rollers on four wheels leave two of them without load; at 0.8, those of turning wheels
+# carry 3/4 of a robot that moves diagonally, as each comes down on the ground at speed (measured).
+TYRE_SAG, TYRE_DAMPING, ROLLER_DAMPING = 0.001, 0.8, 0.2
+GRIP_ERROR = 0.01  # share by which the friction of rollers may be off, chosen
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -159,6 +162,12 @@ class _Session:
             # small angles keep their digits: whole turns are added when reading
             bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
             self.offset[link] = float(angle - fold(float(angle)))
+        # rollers of each wheel that has any, and the axis of its lowest, which holds it
+        by_wheel = [np.flatnonzero(model.is_roller & (model.parents == f)) for f in model.feet]
+        self.rollers = [found.tolist() for found in by_wheel if len(found)]
+        lowest = [min(found, key=lambda i: model.frames[i][0][2]) for found in self.rollers]
+        self.axes = np.array([model.frames[i][1][:, 2] for i in lowest]).reshape(-1, 3)
+        self.grips = np.ones(len(self.axes))
         self.turns = np.array([self.offset[link] for link in model.targets])
         self.before: Array | None = None
         links = model.links
@@ -197,10 +206,17 @@ class _Session:
             lateralFriction=link.grip * self.stage.scene.friction, spinningFriction=0.0,
             rollingFriction=0.0, restitution=0.0,
         )  # fmt: skip
-        if number in self.model.feet and link.shapes[:1] and link.shapes[0].kind == "sphere":
+        if link.joint.role == "roller":
+            bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
+        rolls = link.joint.role == "roller"
+        if rolls:  # friction along the axis alone: light rollers would never get up to speed
+            bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
+        ball = number in self.model.feet and link.shapes[:1] and link.shapes[0].kind == "sphere"
+        if ball or (rolls and not self.stage.broken):
             load = self.model.mass / len(self.model.feet)
             stiffness = load * STANDARD_GRAVITY / TYRE_SAG
-            give = TYRE_DAMPING * 2.0 * math.sqrt(stiffness * load)
+            share = ROLLER_DAMPING if rolls else TYRE_DAMPING
+            give = share * 2.0 * math.sqrt(stiffness * load)
             bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=give)
         meets = WHEELS if link.meets == "ground" else OUTLINE
         bullet.setCollisionFilterGroupMask(robot, joint, *meets)
@@ -226,6 +242,8 @@ class _Session:
                 robot, self.steered, bullet.POSITION_CONTROL, targetPositions=self.before.tolist(),
                 targetVelocities=rates.tolist(), forces=self.powers,
             )  # fmt: skip
+        if len(self.axes):
+            self._grip()
         if self.forced:
             self.rests[self.commanded] = angles[count:]
             now, speeds, _ = self.joints(tuple(self.forced))
@@ -235,6 +253,24 @@ class _Session:
                 forces=np.clip(forces, -self.most, self.most).tolist(),
             )  # fmt: skip
         bullet.stepSimulation()
+
+    def _grip(self) -> None:
+        """Friction of rollers along their axes, set anew where the robot has turned.
+
+        Bullet's two directions of friction, of which the first has no x, are both laid along a
+        roller's axis, each as long as its share: together they hold |c1| + |c2| times what one
+        does.
+        """
+        _, attitude = self.bullet.getBasePositionAndOrientation(self.robot)
+        turn = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
+        first = np.array([0.0, -turn[2, 2], turn[1, 2]]) / math.hypot(turn[1, 2], turn[2, 2])
+        share = np.abs(self.axes @ turn.T @ first)
+        wanted = 1.0 / (share + np.sqrt(np.maximum(1.0 - share**2, 0.0)))
+        for k in np.flatnonzero(np.abs(wanted - self.grips) > GRIP_ERROR * wanted):
+            self.grips[k] = wanted[k]
+            for i in self.rollers[k]:
+                grip = float(wanted[k]) * self.model.links[i].grip * self.stage.scene.friction
+                self.bullet.changeDynamics(self.robot, self.joint[i], lateralFriction=grip)
 
     def base(self) -> Motion:
         """See ``engine.Session``."""
