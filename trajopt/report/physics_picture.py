@@ -56,8 +56,8 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
             times,
             1e3 * (recording.wheel_angles[:, i] - planned_wheels[:, i]),
             linewidth=1.1,
-            color=WHEEL_COLOURS[i % 4],
-            linestyle=WHEEL_DASHES[i % 4],
+            color=WHEEL_COLOURS[i % 8],
+            linestyle=WHEEL_DASHES[i % 8],
             label=name,
         )
     panels[3].set_ylabel("wheel error (mrad)")
@@ -83,7 +83,9 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
 def _draw_paths(axes: Axes, solution: Solution, report: ValidationReport) -> None:
     robot, pose = solution.problem.robot, report.recording.pose
     planned, final = report.planned[-1], pose[-1]
-    draw_scene(axes, solution.problem.scene)
+    ends = (outline(robot, p) for p in (report.planned[0], planned, final))
+    seen = np.vstack([pose[:, :2], *ends])
+    draw_scene(axes, solution.problem.scene, seen)
     draw_robot(axes, robot, report.planned[0], GREEN, strong=True, label="start")
     draw_robot(axes, robot, planned, GREY, strong=True, label="end, planned")
     draw_robot(axes, robot, final, VERMILION, strong=True, label="end, simulated")
@@ -91,10 +93,7 @@ def _draw_paths(axes: Axes, solution: Solution, report: ValidationReport) -> Non
         report.planned[:, 0], report.planned[:, 1], color=GREY, linewidth=2.6, label="path, planned"
     )
     axes.plot(pose[:, 0], pose[:, 1], color=VERMILION, linewidth=1.3, label="path, simulated")
-    frame_points(
-        axes,
-        np.vstack([pose[:, :2], *(outline(robot, p) for p in (report.planned[0], planned, final))]),
-    )
+    frame_points(axes, seen)
     axes.set_title(
         f"{solution.problem.title}: simulated in {report.engine}\nfinal position off by "
         f"{1e3 * report.final_distance:.1f} mm, yaw by {1e3 * report.yaw:.1f} mrad"

@@ -56,6 +56,7 @@ _OF_A_SOLUTION = (
     "explored.npz",
     "path.png",
     "profile.png",
+    "loads.png",
     "convergence.png",
 )
 
