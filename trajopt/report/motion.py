@@ -78,11 +78,9 @@ def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
             ("rate", state.steering_rates, "rad/s"),
         ):
             if which:
-                i, k = np.unravel_index(
-                    int(np.abs(values[:, which]).argmax()), (len(s), len(which))
-                )
-                value, wheel = values[i, which[k]], wheels[which[k]].name
-                found.append((f"{word} {quantity}, {wheel}", f"{value:.3f} {unit}", float(s[i])))
+                at, k = divmod(int(np.abs(values[:, which]).argmax()), len(which))
+                value, wheel = values[at, which[k]], wheels[which[k]].name
+                found.append((f"{word} {quantity}, {wheel}", f"{value:.3f} {unit}", float(s[at])))
     return found
 
 
