@@ -8,7 +8,6 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.robots.robot import Robot
-from trajopt.robots.steering import steering_of
 from trajopt.timing.trajectory import Trajectory
 
 _MOMENTS = 2001  # at which the largest is looked for, chosen
@@ -36,10 +35,10 @@ def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
     columns |= {"z_m": state.position[:, 2], "roll_rad": roll, "pitch_rad": pitch}
     columns |= dict(zip(("vx_m_s", "vy_m_s", "yaw_rate_rad_s"), state.twist.T, strict=True))
     if trajectory.robot is not None:
-        steering = steering_of(trajectory.robot)
         wheels = trajectory.robot.description.wheels
         spins = [i for i, wheel in enumerate(wheels) if wheel.kind != "spherical"]
-        turns = sorted((*steering.steered, *steering.castors))
+        names = turning_wheels(trajectory.robot)
+        turns = [i for i, wheel in enumerate(wheels) if wheel.name in names]
         for quantity, values, which in (
             ("angle_rad", state.spin_angles, spins),
             ("speed_rad_s", state.spin_rates, spins),
@@ -133,6 +132,11 @@ def limit_use(trajectory: Trajectory) -> tuple[Array, Array]:
         for v in (times, shares)
     )
     return next(curves), next(curves)
+
+
+def turning_wheels(robot: Robot) -> list[str]:
+    """Names of its steered wheels and castors."""
+    return [w.name for w in robot.description.wheels if w.kind in ("steered", "castor")]
 
 
 def wheel_columns(quantity: str, values: Array, robot: Robot) -> dict[str, Array]:
