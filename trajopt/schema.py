@@ -58,7 +58,9 @@ def _one_or_each(value: Any, read: Any) -> Any:
         raise broken_rule("", value, "a number > 0, or an array of them") from None
 
 
-OneOrEach = Annotated[Positive | tuple[Positive, ...], WrapValidator(_one_or_each)]
+OneOrEach = Annotated[
+    Positive | Annotated[tuple[Positive, ...], Field(min_length=1)], WrapValidator(_one_or_each)
+]
 
 
 def as_problem_error(error: PydanticCustomError, file: str) -> ProblemError:

@@ -22,8 +22,8 @@ from trajopt.pipeline import solve
 from trajopt.problem import load_problem, problem_schema
 from trajopt.systems.smdw.thesis import DRIVES
 
-FILES = sorted((ROOT / "problems/smdw").glob("*.toml")) + sorted(
-    (ROOT / "problems/powerbot").glob("*.toml")
+FILES = sorted(
+    file for file in (ROOT / "problems").glob("*/*.toml") if file.parent.name != "sweeps"
 )
 POST = {"name": "post", "kind": "circle", "height": 1.0, "centre": [9.0, 9.0], "radius": 0.1}
 _FORM = {"direction": 0.0, "length": 1.0, "height": 0.1, "rounding": 0.3}

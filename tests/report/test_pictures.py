@@ -14,9 +14,10 @@ from matplotlib.image import imread
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import History, Status
 from trajopt.report.convergence_picture import convergence_figure
+from trajopt.report.motion import limit_use
 from trajopt.report.path_picture import path_figure
 from trajopt.report.pictures import save_physics_picture, save_pictures
-from trajopt.report.profile_picture import band_times, limit_use, profile_figure
+from trajopt.report.profile_picture import band_times, profile_figure
 from trajopt.simulate.check import ValidationReport
 from trajopt.solution import Solution
 
@@ -39,7 +40,7 @@ def test_every_kind_of_result_has_its_pictures(
     before = dict(mpl.rcParams)
     files = save_pictures(solution, tmp_path)
     expected = {"path.png", "convergence.png"} | (
-        {"profile.png"} if solution.trajectory is not None else set()
+        {"profile.png", "loads.png"} if solution.trajectory is not None else set()
     )
     assert {file.name for file in files} == expected == {file.name for file in tmp_path.iterdir()}
     for file in files:

@@ -28,6 +28,7 @@ def explain(
     engine: Annotated[str, typer.Option(help="auto, toppra or compiled")] = "auto",
 ) -> None:
     """Show which limit binds on which stretch, and what a 1 % change of each limit would save."""
+    from trajopt.report.motion import limit_use, most
     from trajopt.timing.engines import ENGINES
     from trajopt.timing.sensitivity import sensitivities
 
@@ -46,16 +47,28 @@ def explain(
         stretches.add_row(f"{stretch.start:.3f}", f"{stretch.end:.3f}", stretch.limit)
     console.print(stretches)
     limits = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for column in ("limit", "least margin", "1 % more saves (s)"):
+    for column in ("limit", "least margin", "at s (m)", "1 % more saves (s)"):
         limits.add_column(column, justify="left" if column == "limit" else "right")
     optimal = trajectory.engine in ENGINES  # only of those one can say what a limit costs
     savings = sensitivities(trajectory) if optimal else {}
+    times, used = limit_use(trajectory)
+    tightest = times[used.argmax(axis=0), range(used.shape[1])]
+    names = [limit.name for limit in trajectory.limits]
+    places = dict(zip(names, trajectory.along(tightest)[0], strict=True))
     for name, margin in sorted(
         trajectory.margins().items(), key=lambda item: (-savings.get(item[0], 0.0), item[1])
     ):
         saved = f"{savings[name]:.4f}" if optimal else "not time-optimal"
-        limits.add_row(name, f"{margin if margin < -1e-9 else max(margin, 0.0):.2%}", saved)
+        shown = f"{margin if margin < -1e-9 else max(margin, 0.0):.2%}"
+        limits.add_row(name, shown, f"{places[name]:.3f}", saved)
     console.print(limits)
+    extremes = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for column in ("on the way", "up to", "at s (m)"):
+        extremes.add_column(column, justify="left" if column == "on the way" else "right")
+    for name, value, place in most(trajectory):
+        extremes.add_row(name, value, f"{place:.3f}")
+    if extremes.rows:
+        console.print(extremes)
 
 
 def export(
@@ -67,7 +80,8 @@ def export(
     ] = "mean",
     set_: Overrides = None,
 ) -> None:
-    """Write speed commands for every wheel: t (s), v_<wheel> (m/s at the rim)."""
+    """Write commands for every wheel: t (s), v_<wheel> (m/s at the rim), and steering_<wheel> (rad)
+    where it steers."""
     from trajopt.control.commands import commands, export_commands
 
     if rule not in ("mean", "held"):

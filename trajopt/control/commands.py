@@ -18,6 +18,7 @@ from trajopt.arrays import Array, fold, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
 from trajopt.robots.robot import Robot
+from trajopt.robots.steering import steering_of
 from trajopt.timing.trajectory import Trajectory
 
 _SMALL_TURN = 1e-9  # rad in one step below which a step is straight
@@ -28,12 +29,15 @@ _MOST_COMMANDS = 1_000_000  # of one motion, chosen: a microsecond is no sample 
 @dataclass(frozen=True, eq=False)
 class Commands:
     """Speeds (N, W), m/s, of the rims of the ``wheels``, each held from ``times`` (N,), s, for
-    ``sample_time``."""
+    ``sample_time``; ``steering`` (N + 1, S), rad: angles of the ``steered`` wheels at the times and
+    at the end, from the angle that the robot's file gives."""
 
     times: Array
     speeds: Array
     wheels: tuple[str, ...]
     sample_time: float
+    steering: Array
+    steered: tuple[str, ...]
 
     @property
     def duration(self) -> float:
@@ -94,7 +98,10 @@ def commands(
         speeds = np.diff(state.wheel_angles, axis=0) * radius / sample_time
     else:
         raise ArgumentError("rule", rule, "held or mean")
-    return Commands(edges[:-1], speeds, robot.wheel_names, sample_time)
+    wheels = steering_of(robot)
+    names = tuple(wheels.names[i] for i in wheels.steered)
+    steering = state.steering_angles[:, wheels.steered]
+    return Commands(edges[:-1], speeds, robot.wheel_names, sample_time, steering, names)
 
 
 def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array) -> Array:
@@ -120,15 +127,17 @@ def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array)
 
 
 def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
-    """Write t (s) and a column v_<wheel> (m/s) a wheel as CSV for a robot; ends with a row of
-    zeros."""
+    """Write t (s), a column v_<wheel> (m/s) a wheel and a column steering_<wheel> (rad) a steered
+    wheel as CSV for a robot; ends with a row of speeds 0."""
     path = FilePath(file)
     with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        writer.writerow(["t", *(f"v_{name}" for name in orders.wheels)])
-        for t, row in zip(orders.times, orders.speeds, strict=True):
-            writer.writerow([f"{t:.6g}", *(f"{speed:.9g}" for speed in row)])
-        writer.writerow([f"{orders.duration:.6g}", *("0" for _ in orders.wheels)])
+        names = [f"v_{name}" for name in orders.wheels]
+        writer.writerow(["t", *names, *(f"steering_{name}" for name in orders.steered)])
+        times = np.append(orders.times, orders.duration)
+        speeds = np.vstack([orders.speeds, np.zeros((1, len(orders.wheels)))])
+        for t, row in zip(times, np.hstack([speeds, orders.steering]), strict=True):
+            writer.writerow([f"{t:.6g}", *(f"{value:.9g}" for value in row)])
     return path
 
 

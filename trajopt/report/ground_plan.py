@@ -11,12 +11,15 @@ from matplotlib.patches import Polygon, Rectangle
 
 from trajopt.arrays import Array
 from trajopt.problem.task import Space
-from trajopt.report.style import BLACK, GREY, LIGHT
+from trajopt.report.style import BLACK, BROWN, GREY, LIGHT
 from trajopt.robots.robot import Robot
+from trajopt.world.ground import Ground
 from trajopt.world.scene import Scene
 
 _NOSE = 0.22  # share of the robot's length that the mark of its front takes, chosen
-_RAMP = 2.0  # m, drawn width of a ramp, chosen
+_AROUND = 1.0  # m, around a motion in which heights are drawn, chosen
+_PLACES = 200  # along x and y, where heights are read, chosen
+_LEVELS = 9  # contour lines, about; chosen
 _ROOM = 0.15  # m, around a motion in which obstacles are drawn, chosen
 
 
@@ -93,17 +96,11 @@ def draw_space(axes: Axes, space: Space) -> None:
     )
 
 
-def draw_scene(axes: Axes, scene: Scene) -> None:
-    """Obstacles hatched, ramps as plain strips."""
-    for k, ramp in enumerate(getattr(scene.ground, "ramps", ())):
-        ahead = np.array([np.cos(ramp.direction), np.sin(ramp.direction)])
-        foot, along = np.array(ramp.place), _RAMP / 2 * np.array([-ahead[1], ahead[0]])
-        top = foot + ramp.run * ahead
-        label = f"ramp, {ramp.height:g} m high (drawn {_RAMP:g} m wide)"
-        strip = np.array([foot - along, foot + along, top + along, top - along])
-        axes.add_patch(
-            Polygon(strip, facecolor="#eee9f2", edgecolor=LIGHT, label=None if k else label)
-        )
+def draw_scene(axes: Axes, scene: Scene, seen: Array) -> None:
+    """Obstacles hatched, and contour lines of the ground around ``seen`` (N, 2) where it is not
+    level."""
+    if not scene.ground.level:
+        _draw_heights(axes, scene.ground, seen)
     for thing in scene.obstacles:
         axes.add_patch(
             Polygon(
@@ -117,6 +114,16 @@ def draw_scene(axes: Axes, scene: Scene) -> None:
                 label=f"{thing.name}, {thing.height:g} m high",
             )
         )
+
+
+def _draw_heights(axes: Axes, ground: Ground, seen: Array) -> None:
+    low, high = seen.min(axis=0) - _AROUND, seen.max(axis=0) + _AROUND
+    x, y = np.meshgrid(*(np.linspace(low[k], high[k], _PLACES) for k in (0, 1)))
+    lines = axes.contour(
+        x, y, ground.height(x, y), levels=_LEVELS, colors=BROWN, linewidths=0.6, zorder=0.3
+    )
+    axes.clabel(lines, fmt="%g", fontsize=6.5)
+    axes.plot([], [], color=BROWN, linewidth=0.6, label="height of the ground, m")
 
 
 def near_points(scene: Scene, seen: Array) -> Array:

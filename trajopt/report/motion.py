@@ -8,10 +8,15 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.robots.robot import Robot
-from trajopt.robots.steering import steering_of
 from trajopt.timing.trajectory import Trajectory
 
+_MOMENTS = 2001  # at which the largest is looked for, chosen
 SAMPLE_TIME = 0.01  # s, largest step of trajectory.csv; chosen: 100 rows a second
+_INSIDE = (
+    0.001,
+    0.5,
+    0.999,
+)  # of an interval: where limits are read; not on its ends, rows jump at knots. Chosen
 
 
 def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
@@ -30,10 +35,10 @@ def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
     columns |= {"z_m": state.position[:, 2], "roll_rad": roll, "pitch_rad": pitch}
     columns |= dict(zip(("vx_m_s", "vy_m_s", "yaw_rate_rad_s"), state.twist.T, strict=True))
     if trajectory.robot is not None:
-        steering = steering_of(trajectory.robot)
         wheels = trajectory.robot.description.wheels
         spins = [i for i, wheel in enumerate(wheels) if wheel.kind != "spherical"]
-        turns = sorted((*steering.steered, *steering.castors))
+        names = turning_wheels(trajectory.robot)
+        turns = [i for i, wheel in enumerate(wheels) if wheel.name in names]
         for quantity, values, which in (
             ("angle_rad", state.spin_angles, spins),
             ("speed_rad_s", state.spin_rates, spins),
@@ -54,6 +59,30 @@ def posture(rotation: Array) -> tuple[Array, Array]:
     return np.asarray(roll), -np.arcsin(np.clip(rotation[:, 2, 0], -1.0, 1.0))
 
 
+def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
+    """What is largest on the way, with its unit, and where (m): pitch and roll on ground that is
+    not level, angle and rate of the wheel that steers or swivels most."""
+    times = np.linspace(0.0, trajectory.duration, _MOMENTS)
+    state, s = trajectory.at(times), trajectory.along(times)[0]
+    found = []
+    if not trajectory.ground.level:
+        for name, tilt in zip(("roll", "pitch"), posture(state.rotation), strict=True):
+            i = int(np.abs(tilt).argmax())
+            found.append((name, f"{np.degrees(tilt[i]):.2f} deg", float(s[i])))
+    wheels = [] if trajectory.robot is None else list(trajectory.robot.description.wheels)
+    for kind, word in (("steered", "steering"), ("castor", "castor")):
+        which = [i for i, wheel in enumerate(wheels) if wheel.kind == kind]
+        for quantity, values, unit in (
+            ("angle", state.steering_angles, "rad"),
+            ("rate", state.steering_rates, "rad/s"),
+        ):
+            if which:
+                at, k = divmod(int(np.abs(values[:, which]).argmax()), len(which))
+                value, wheel = values[at, which[k]], wheels[which[k]].name
+                found.append((f"{word} {quantity}, {wheel}", f"{value:.3f} {unit}", float(s[at])))
+    return found
+
+
 def binding_at(trajectory: Trajectory, times: Array) -> list[str]:
     """Name of the limit that binds at each time (s), "" where none does."""
     interval = np.clip(
@@ -67,6 +96,47 @@ def binding_shares(trajectory: Trajectory) -> dict[str, float]:
     steps, names = np.diff(trajectory.times) / trajectory.duration, np.array(trajectory.binding)
     shares = {limit.name: float(steps[names == limit.name].sum()) for limit in trajectory.limits}
     return dict(sorted(((k, v) for k, v in shares.items() if v > 0), key=lambda item: -item[1]))
+
+
+def limit_use(trajectory: Trajectory) -> tuple[Array, Array]:
+    """Most of each limit in use between gridpoints, and when: times (s) and shares, both (N + 2,
+    L).
+
+    The first and last rows belong to the ends of the motion, the N between to the intervals.
+
+    A share of 1 is all of the limit, more is broken. From the limits' own rows: 1 minus the
+    relative margin, as ``Trajectory.margins`` defines it.
+    """
+    u, sdd = trajectory.u, trajectory.sdd
+    shares = np.zeros((len(_INSIDE), len(sdd), len(trajectory.limits)))
+    times = np.empty((len(_INSIDE), len(sdd), 1))
+    for j, part in enumerate(_INSIDE):
+        here = u[:-1] + part * np.diff(u)
+        s = trajectory.path.parameter(here)
+        sd2 = np.maximum(trajectory.sd[:-1] ** 2 + 2 * sdd * (s - trajectory.s[:-1]), 0.0)
+        times[j, :, 0] = trajectory.times[:-1] + 2 * (s - trajectory.s[:-1]) / (
+            trajectory.sd[:-1] + np.sqrt(sd2)
+        )
+        samples = trajectory.track.samples(s, here)
+        for k, limit in enumerate(trajectory.limits):
+            rows = limit.rows(samples, trajectory.robot)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                shares[j, :, k] = np.nan_to_num(np.sqrt(sd2 / rows.sd2_max))
+            if rows.a.shape[1]:
+                beyond = (rows.a * sdd[:, None] + rows.b * sd2[:, None] - rows.c) / rows.scale
+                shares[j, :, k] = np.maximum(shares[j, :, k], 1.0 + beyond.max(axis=1))
+    times = np.broadcast_to(times, shares.shape)
+    most = shares.argmax(axis=0)[None]
+    curves = (
+        np.vstack([v[0, :1], np.take_along_axis(v, most, axis=0)[0], v[-1, -1:]])
+        for v in (times, shares)
+    )
+    return next(curves), next(curves)
+
+
+def turning_wheels(robot: Robot) -> list[str]:
+    """Names of its steered wheels and castors."""
+    return [w.name for w in robot.description.wheels if w.kind in ("steered", "castor")]
 
 
 def wheel_columns(quantity: str, values: Array, robot: Robot) -> dict[str, Array]:

@@ -57,7 +57,7 @@ def path_figure(solution: Solution, path: Path) -> Figure:
         draw_space(axes, problem.space)
     if solution.search is not None:
         _draw_explored(axes, solution, solution.search)
-    draw_scene(axes, problem.scene)
+    draw_scene(axes, problem.scene, seen)
     for pose in poses[np.linspace(0, len(poses) - 1, _MOMENTS + 2).round().astype(int)[1:-1]]:
         draw_robot(axes, robot, pose, zorder=2.2)
     draw_robot(axes, robot, poses[0], GREEN, strong=True, label="start", zorder=2.4)

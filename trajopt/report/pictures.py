@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from trajopt.files import whole_file
 from trajopt.report.convergence_picture import convergence_figure
 from trajopt.report.files import made_folder
+from trajopt.report.loads_picture import loads_figure, stands
 from trajopt.report.path_picture import path_figure
 from trajopt.report.physics_picture import physics_figure
 from trajopt.report.profile_picture import profile_figure
@@ -20,7 +21,8 @@ if TYPE_CHECKING:
 
 def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath, ...]:
     """Draw path.png, where there is a path, convergence.png, where control points were searched,
-    and profile.png, where there is a trajectory. Returns the files.
+    profile.png, where there is a trajectory, and loads.png, where its robot stands on three wheels
+    or more. Returns the files.
 
     Raises ArgumentError where the folder cannot be written.
     """
@@ -32,10 +34,11 @@ def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath,
         if solution.search is not None:
             figure = convergence_figure(solution, solution.search)
             files.append(save_figure(figure, place / "convergence.png"))
-        if solution.trajectory is not None:
-            files.append(
-                save_figure(profile_figure(solution, solution.trajectory), place / "profile.png")
-            )
+        timed = solution.trajectory
+        if timed is not None:
+            files.append(save_figure(profile_figure(solution, timed), place / "profile.png"))
+            if stands(solution.problem.robot):
+                files.append(save_figure(loads_figure(solution, timed), place / "loads.png"))
     return tuple(files)
 
 

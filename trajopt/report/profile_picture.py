@@ -4,6 +4,7 @@ when."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,8 +13,7 @@ from matplotlib.patches import Patch
 
 from trajopt.arrays import Array
 from trajopt.limits.wheel_speed import WheelSpeed
-from trajopt.paths.samples import sample_at
-from trajopt.report.motion import binding_shares
+from trajopt.report.motion import binding_shares, limit_use, posture
 from trajopt.report.style import (
     BLACK,
     BLUE,
@@ -27,30 +27,30 @@ from trajopt.report.style import (
     limit_colour,
     new_figure,
 )
+from trajopt.robots.steering import steering_of
 from trajopt.solution import MARGIN, Solution
-from trajopt.timing.trajectory import Trajectory
+from trajopt.timing.trajectory import State, Trajectory
 
 _SAMPLES = 1200  # times at which curves are drawn, chosen: more than pixels across
-_INSIDE = (
-    0.001,
-    0.5,
-    0.999,
-)  # of an interval: where limits are read; not on its ends, rows jump at knots. Chosen
 _BAND = 0.16  # opacity of the bands that mark the limit which binds, chosen
 _HEADROOM = 1.12  # axes end this far beyond the limit lines, chosen
 
 
 def profile_figure(solution: Solution, trajectory: Trajectory) -> Figure:
-    """Stacked panels over time (s): position, yaw, speed, wheel speeds, and the share of each limit
-    in use."""
+    """Stacked panels over time (s): position, yaw, speed, wheel speeds, tilt where the ground is not
+    level, angles and rates of wheels that turn, and the share of each limit in use."""
     times = np.linspace(0.0, trajectory.duration, _SAMPLES)
     state = trajectory.at(times)
     limits = solution.problem.limits_section
-    figure = new_figure(9.2)
+    turning_wheels, sloping = _turning_wheels(trajectory), not trajectory.ground.level
+    heights = [1, 0.8, 1.1, 0.8, 1.4, 1.2]
+    more = [0.8] * sloping + [1.0, 1.0] * bool(turning_wheels)
+    figure = new_figure(9.2 + 1.4 * sum(more))
     panels: Sequence[Axes] = figure.subplots(
-        6, 1, sharex=True, gridspec_kw={"height_ratios": [1, 0.8, 1.1, 0.8, 1.4, 1.2]}
+        6 + len(more), 1, sharex=True, gridspec_kw={"height_ratios": [*heights[:5], *more, 1.2]}
     )
-    position, yaw, speed, turning, wheels, use = panels
+    position, yaw, speed, turning, wheels = panels[:5]
+    use = panels[-1]
     _lines(position, times, state.pose[:, :2], ("x", "y"), (BLUE, VERMILION), "position (m)")
     _lines(yaw, times, state.pose[:, 2:], ("yaw",), (BLACK,), "yaw (rad)")
     _lines(speed, times, state.twist[:, :2], ("forward", "left"), (BLUE, VERMILION), "speed (m/s)")
@@ -59,6 +59,12 @@ def profile_figure(solution: Solution, trajectory: Trajectory) -> Figure:
     _lines(turning, times, state.twist[:, 2:], ("yaw rate",), (BLACK,), "yaw rate (rad/s)")
     _limit_lines(turning, limits.yaw_rate, "limit", both=True)
     _draw_wheels(wheels, times, state.wheel_speeds, solution)
+    if sloping:
+        tilt = np.degrees(np.column_stack(posture(state.rotation)))
+        names = ("roll, left side up", "pitch, nose down")
+        _lines(panels[5], times, tilt, names, (VERMILION, BLUE), "tilt (deg)")
+    if turning_wheels:
+        _draw_steering(panels[-3:-1], times, state, turning_wheels)
     _draw_use(use, trajectory)
     for axes in panels:
         _bands(axes, trajectory)
@@ -73,40 +79,31 @@ def profile_figure(solution: Solution, trajectory: Trajectory) -> Figure:
     return figure
 
 
-def limit_use(trajectory: Trajectory) -> tuple[Array, Array]:
-    """Most of each limit in use between gridpoints, and when: times (s) and shares, both (N + 2,
-    L).
+def _turning_wheels(trajectory: Trajectory) -> dict[int, str]:
+    """Names of the castors and steered wheels by their place in the robot's file; wheels of one
+    pivot, which share an angle, under its name."""
+    if trajectory.robot is None:
+        return {}
+    steering, description = steering_of(trajectory.robot), trajectory.robot.description
+    found = {i: steering.names[i] for i in sorted((*steering.steered, *steering.castors))}
+    for pivot in description.pivots:
+        first, *others = (steering.names.index(name) for name in pivot.wheels)
+        found[first] = pivot.name
+        for i in others:
+            del found[i]
+    return found
 
-    The first and last rows belong to the ends of the motion, the N between to the intervals.
 
-    A share of 1 is all of the limit, more is broken. From the limits' own rows: 1 minus the
-    relative margin, as ``Trajectory.margins`` defines it.
-    """
-    u, sdd = trajectory.u, trajectory.sdd
-    shares = np.zeros((len(_INSIDE), len(sdd), len(trajectory.limits)))
-    times = np.empty((len(_INSIDE), len(sdd), 1))
-    for j, part in enumerate(_INSIDE):
-        here = u[:-1] + part * np.diff(u)
-        s = trajectory.path.parameter(here)
-        sd2 = np.maximum(trajectory.sd[:-1] ** 2 + 2 * sdd * (s - trajectory.s[:-1]), 0.0)
-        times[j, :, 0] = trajectory.times[:-1] + 2 * (s - trajectory.s[:-1]) / (
-            trajectory.sd[:-1] + np.sqrt(sd2)
-        )
-        samples = sample_at(trajectory.path, s, here)
-        for k, limit in enumerate(trajectory.limits):
-            rows = limit.rows(samples, trajectory.robot)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                shares[j, :, k] = np.nan_to_num(np.sqrt(sd2 / rows.sd2_max))
-            if rows.a.shape[1]:
-                beyond = (rows.a * sdd[:, None] + rows.b * sd2[:, None] - rows.c) / rows.scale
-                shares[j, :, k] = np.maximum(shares[j, :, k], 1.0 + beyond.max(axis=1))
-    times = np.broadcast_to(times, shares.shape)
-    most = shares.argmax(axis=0)[None]
-    curves = (
-        np.vstack([v[0, :1], np.take_along_axis(v, most, axis=0)[0], v[-1, -1:]])
-        for v in (times, shares)
-    )
-    return next(curves), next(curves)
+def _draw_steering(
+    panels: Sequence[Axes], times: Array, state: State, wheels: dict[int, str]
+) -> None:
+    """Angles and rates of steered wheels and castors."""
+    for k, (i, name) in enumerate(wheels.items()):
+        look: dict[str, Any] = {"color": WHEEL_COLOURS[k % 8], "linestyle": WHEEL_DASHES[k % 4]}
+        panels[0].plot(times, state.steering_angles[:, i], **look, label=name)
+        panels[1].plot(times, state.steering_rates[:, i], **look)
+    panels[0].set_ylabel("steering (rad)")
+    panels[1].set_ylabel("steering rate (rad/s)")
 
 
 def _lines(
@@ -138,8 +135,8 @@ def _draw_wheels(axes: Axes, times: Array, speeds: Array, solution: Solution) ->
         axes.plot(
             times,
             speeds[:, i],
-            color=WHEEL_COLOURS[i % 4],
-            linestyle=WHEEL_DASHES[i % 4],
+            color=WHEEL_COLOURS[i % 8],
+            linestyle=WHEEL_DASHES[i % 8],
             label=name,
         )
     axes.set_ylabel("wheel speed (rad/s)")

@@ -36,7 +36,14 @@ from trajopt.report.files import (
     write_table,
     write_text,
 )
-from trajopt.report.motion import binding_shares, timing_table, trajectory_table, wheel_columns
+from trajopt.report.motion import (
+    binding_shares,
+    column,
+    timing_table,
+    trajectory_table,
+    turning_wheels,
+    wheel_columns,
+)
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
 from trajopt.timing.trajectory import Trajectory
@@ -56,6 +63,7 @@ _OF_A_SOLUTION = (
     "explored.npz",
     "path.png",
     "profile.png",
+    "loads.png",
     "convergence.png",
 )
 
@@ -243,6 +251,17 @@ def write_validation(report: ValidationReport, folder: str | FilePath, robot: Ro
     columns |= wheel_columns("angle_rad", recording.wheel_angles, robot)
     columns |= wheel_columns("speed_rad_s", recording.wheel_speeds, robot)
     columns |= wheel_columns("torque_nm", recording.wheel_torques, robot)
+    columns |= {"z_m": recording.height, "roll_rad": recording.roll, "pitch_rad": recording.pitch}
+    turns = [report.wheels.index(name) for name in turning_wheels(robot)]
+    every, plan = range(len(report.wheels)), report.wheel_plan
+    for quantity, values, which in (
+        ("load_n", recording.loads, every),
+        ("planned_load_n", plan.loads, every),
+        ("slip_m_s", recording.slip, every),
+        ("steering_rad", report.steering, turns),
+        ("planned_steering_rad", plan.steering, turns),
+    ):
+        columns |= {column(report.wheels[i], quantity): values[:, i] for i in which}
     write_table(place / "simulated.csv", {"t_s": recording.times, **columns})
     summary = validation_summary(report, robot)
     summary["run"] = {
@@ -280,6 +299,14 @@ def validation_summary(report: ValidationReport, robot: Robot) -> dict[str, Any]
             for hit in report.contacts
         ],
         "slip_m_s": dict(zip(report.wheels, report.slip.tolist(), strict=True)),
+        "steering_error_rad": {
+            name: float(report.steering_error[report.wheels.index(name)])
+            for name in turning_wheels(robot)
+        },
+        "mean_load_n": dict(zip(report.wheels, report.recording.loads.mean(axis=0), strict=True)),
+        "planned_mean_load_n": dict(
+            zip(report.wheels, report.wheel_plan.loads.mean(axis=0), strict=True)
+        ),
         "versions": versions(),
         "commit": commit(),
     }

@@ -20,11 +20,15 @@ from trajopt.files import whole_file
 BLACK, GREY, LIGHT = "#000000", "#6b6b6b", "#c9c9c9"
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
+BROWN = "#a08060"  # chosen: contour lines
 
 # Wheels in the order of every per-wheel array: colour tells left from right, the dash front from
-# rear.
-WHEEL_COLOURS = (BLUE, VERMILION, BLUE, VERMILION)
-WHEEL_DASHES = ("-", "-", (0, (4, 1.5)), (0, (4, 1.5)))
+# rear, and further pairs from these.
+WHEEL_COLOURS = (BLUE, VERMILION) * 4
+WHEEL_DASHES: tuple[Any, ...] = (
+    *("-", "-", (0, (4, 1.5)), (0, (4, 1.5))),
+    *(":", ":", (0, (4, 1.5, 1, 1.5)), (0, (4, 1.5, 1, 1.5))),
+)
 
 LIMIT_COLOURS: Mapping[str, str] = MappingProxyType(
     {
@@ -37,6 +41,9 @@ LIMIT_COLOURS: Mapping[str, str] = MappingProxyType(
         "yaw_rate": SKY,
         "speed_profile": YELLOW,
         "speed_zones": YELLOW,
+        "steering_rate": "#5e3c99",  # chosen: two violets that the rest has not
+        "steering_acceleration": "#b2abd2",
+        "contact": GREY,
     }
 )
 _SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed

@@ -9,7 +9,7 @@ from rich import box
 from rich.table import Table
 
 from trajopt.optimize.base import OptimizeResult
-from trajopt.report.motion import binding_shares
+from trajopt.report.motion import binding_shares, turning_wheels
 from trajopt.report.words import words
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
@@ -81,6 +81,11 @@ def validation_table(report: ValidationReport, robot: Robot) -> Table:
         table.add_row(words(f"wheel {name}"), f"{1e3 * value:+.3f} mrad")
     worst = int(report.slip.argmax())
     table.add_row("most slip", words(f"{report.slip[worst]:.3f} m/s, wheel {report.wheels[worst]}"))
+    if turning_wheels(robot):
+        error, names = report.steering_error, turning_wheels(robot)
+        name = max(names, key=lambda name: error[report.wheels.index(name)])
+        most = 1e3 * error[report.wheels.index(name)]
+        table.add_row("most steering error", f"{most:.2f} mrad, wheel {name}")
     for hit in report.contacts:
         x, y = hit.place
         table.add_row(
