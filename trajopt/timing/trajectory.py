@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
@@ -97,7 +97,7 @@ class Trajectory:
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,
         duration]."""
-        time = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        time = np.atleast_1d(as_numbers("t", t, f"times in [0, {self.duration!r}] s"))
         slack = _ON_TIME * self.duration
         if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
             raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
