@@ -21,7 +21,7 @@ from trajopt.arrays import Array, require_finite
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.robots.description import RobotDescription, WheelSection
 from trajopt.robots.wheel import Row, Wheel, WheelKind, kinematic, null_space, outline, wheel_rates
-from trajopt.schema import read_tables, set_key, validated
+from trajopt.schema import changes_of, read_tables, set_key, validated
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, [iso80000-3]
 DATA = Path(__file__).parent / "data"  # the shipped robots
@@ -86,7 +86,7 @@ class Robot:
         """Copy with changed dotted keys ({"body.mass": 20.0}), checked like a file; None takes a
         key out. Raises ProblemError."""
         data = self.description.model_dump(mode="json", exclude_none=True)
-        for key, value in changes.items():
+        for key, value in changes_of(changes, self.description.source):
             set_key(data, key, value, self.description.source)
         return Robot.of(data, self.description.source)
 
