@@ -11,9 +11,12 @@ import pytest
 from trajopt.arrays import (
     as_numbers,
     fold,
+    require_between,
     require_finite,
     require_not_negative,
     require_positive,
+    require_rising,
+    require_whole,
     rotation,
 )
 from trajopt.errors import ArgumentError
@@ -49,19 +52,47 @@ def test_not_finite_is_refused(bad):
 
 
 def test_sign_is_checked():
-    for value in (1e-300, 2, [1.0, 3.0]):
-        require_positive("x", value)
+    for value in (1e-300, 2, np.float32(0.5)):
+        assert require_positive("x", value) == value
+    require_positive("x", [1.0, 3.0], "", None)
     require_not_negative("x", 0.0)
-    require_finite("x", [-1.0, 0.0])
+    require_finite("x", [-1.0, 0.0], "", (2,))
     for require, bad in ((require_positive, [1.0, 0.0]), (require_not_negative, [1.0, -1e-9])):
         with pytest.raises(ArgumentError, match=r"x = \[.*\]: expected a finite value >=? 0 rad"):
-            require("x", bad, "rad")
+            require("x", bad, "rad", None)
 
 
-def test_text_is_not_numbers():
-    with pytest.raises(ArgumentError, match="x = 'ab': expected two numbers"):
-        as_numbers("x", "ab", "two numbers")
+@pytest.mark.parametrize(
+    "bad", ["ab", "1", True, [True], [1, "2"], [None], [1, [2]], 1j, [1.0, object()], 10**400, {}]
+)
+def test_what_is_no_number_is_refused(bad):
+    with pytest.raises(ArgumentError, match=r"x = .*: expected two numbers"):
+        as_numbers("x", bad, "two numbers")
+
+
+def test_numbers_come_as_floats_of_the_shape_asked_for():
     assert as_numbers("x", [1, 2.5], "").tolist() == [1.0, 2.5]
+    assert as_numbers("x", 10**30, "", ()) == 1e30
+    assert as_numbers("x", [], "", (None,)).shape == (0,)
+    assert as_numbers("x", np.ones((4, 2)), "", (None, 2)).shape == (4, 2)
+    for shape in ((), (1,), (3,), (None, 1), (2, None)):
+        with pytest.raises(ArgumentError, match="expected two"):
+            as_numbers("x", [1.0, 2.0], "two", shape)
+
+
+def test_rising_between_and_whole():
+    assert require_rising("x", [0, 1], "m").tolist() == [0.0, 1.0]
+    for bad in ([], [1.0, 1.0], [0.0, np.nan], [0.0, np.inf], 1.0):
+        with pytest.raises(ArgumentError, match="increasing m"):
+            require_rising("x", bad, "m")
+    require_between("x", 0.5, 0, 1, "rad")
+    for bad in (0, 1, np.nan, -1):
+        with pytest.raises(ArgumentError, match="between 0 and 1 rad"):
+            require_between("x", bad, 0, 1, "rad")
+    require_whole("x", np.int64(3), 3, "3 or more")
+    for bad in (2, 3.0, True, "3", 2**64):
+        with pytest.raises(ArgumentError, match="3 or more"):
+            require_whole("x", bad, 3, "3 or more")
 
 
 def test_no_room_has_a_copy():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from numbers import Real
 from typing import Any, overload
 
 import numpy as np
@@ -37,39 +39,82 @@ def rotation(angle: ArrayLike) -> Array:
     return np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
 
 
-def require_finite(argument: str, value: ArrayLike, unit: str = "") -> None:
-    """Raises ArgumentError unless ``value``, a number or an array, is finite everywhere."""
-    expected = f"finite numbers, {unit}".rstrip(", ")
-    if not np.all(np.isfinite(as_numbers(argument, value, expected))):
-        raise ArgumentError(argument, value, expected)
+Shape = tuple[int | None, ...]  # of an array; None: any length
 
 
-def require_positive(argument: str, value: ArrayLike, unit: str = "") -> None:
-    """Raises ArgumentError unless ``value``, a number or an array, is finite and > 0 everywhere."""
-    expected = f"a finite value > 0 {unit}".rstrip()
-    numbers = as_numbers(argument, value, expected)
-    if not (np.all(np.isfinite(numbers)) and np.all(numbers > 0.0)):
-        raise ArgumentError(argument, value, expected)
-
-
-def require_not_negative(argument: str, value: ArrayLike, unit: str = "") -> None:
-    """Raises ArgumentError unless ``value``, a number or an array, is finite and >= 0
-    everywhere."""
-    expected = f"a finite value >= 0 {unit}".rstrip()
-    numbers = as_numbers(argument, value, expected)
-    if not (np.all(np.isfinite(numbers)) and np.all(numbers >= 0.0)):
-        raise ArgumentError(argument, value, expected)
-
-
-def as_numbers(argument: str, value: Any, expected: str) -> Array:
-    """``value`` as an array of real numbers. Raises ArgumentError, saying what was ``expected``,
-    where it is none."""
+def as_numbers(argument: str, value: Any, expected: str, shape: Shape | None = None) -> Array:
+    """``value`` as an array of real numbers, of ``shape`` where one is given: no texts, no masks, no
+    complex numbers, nothing ragged. Raises ArgumentError, saying what was ``expected``."""
     try:
         array = np.asarray(value)
-        if (
-            array.dtype.kind in "biuf" or array.dtype == object or array.size == 0
-        ):  # no text, no complex numbers
-            return np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        if array.dtype == object and all(_is_real(v) for v in array.flat):  # whole ones of any size
+            array = array.astype(np.float64)
+        if array.dtype.kind in "iuf" or array.size == 0:
+            array = np.asarray(value, dtype=np.float64)
+            if shape is None or (
+                len(shape) == array.ndim
+                and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
+            ):
+                return array
+    except (TypeError, ValueError, ArithmeticError):
         pass
     raise ArgumentError(argument, value, expected) from None
+
+
+def _is_real(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, (bool, np.bool_))
+
+
+def require_finite(
+    argument: str, value: ArrayLike, unit: str = "", shape: Shape | None = ()
+) -> Array:
+    """``value``, a number or an array of ``shape`` (None: any), where it is finite everywhere.
+    Raises ArgumentError."""
+    return _where(np.isfinite, argument, value, f"finite numbers, {unit}".rstrip(", "), shape)
+
+
+def require_positive(
+    argument: str, value: ArrayLike, unit: str = "", shape: Shape | None = ()
+) -> Array:
+    """As ``require_finite``, > 0 everywhere."""
+    expected = f"a finite value > 0 {unit}".rstrip()
+    return _where(lambda a: np.isfinite(a) & (a > 0), argument, value, expected, shape)
+
+
+def require_not_negative(
+    argument: str, value: ArrayLike, unit: str = "", shape: Shape | None = ()
+) -> Array:
+    """As ``require_finite``, >= 0 everywhere."""
+    expected = f"a finite value >= 0 {unit}".rstrip()
+    return _where(lambda a: np.isfinite(a) & (a >= 0), argument, value, expected, shape)
+
+
+def _where(
+    fits: Callable[[Array], Any], argument: str, value: Any, expected: str, shape: Shape | None
+) -> Array:
+    array = as_numbers(argument, value, expected, shape)
+    if not np.all(fits(array)):
+        raise ArgumentError(argument, value, expected)
+    return array
+
+
+def require_between(argument: str, value: Any, low: float, high: float, unit: str) -> None:
+    """Raises ArgumentError unless ``value`` is a number between ``low`` and ``high``, both
+    excluded."""
+    expected = f"a number between {low:.6g} and {high:.6g} {unit}"
+    if not low < as_numbers(argument, value, expected, ()) < high:
+        raise ArgumentError(argument, value, expected)
+
+
+def require_rising(argument: str, value: Any, unit: str) -> Array:
+    """``value`` (n,) as an array, n >= 1, finite and increasing. Raises ArgumentError."""
+    array = as_numbers(argument, value, f"increasing {unit}", (None,))
+    if not (len(array) and np.isfinite(array).all() and (np.diff(array) > 0).all()):
+        raise ArgumentError(argument, value, f"increasing {unit}")
+    return array
+
+
+def require_whole(argument: str, value: Any, least: int, expected: str, most: int = 2**63) -> None:
+    """Raises ArgumentError unless ``value`` is a whole number in ``least`` .. ``most``."""
+    if not (isinstance(value, (int, np.integer)) and _is_real(value) and least <= value <= most):
+        raise ArgumentError(argument, value, expected)

@@ -10,21 +10,31 @@ from __future__ import annotations
 import copy
 import difflib
 import json
+import math
 import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, WrapValidator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, WrapValidator
 from pydantic_core import PydanticCustomError
 
 from trajopt.errors import ProblemError
 
 Model = TypeVar("Model", bound=BaseModel)
-Positive = Annotated[float, Field(gt=0)]
+LARGEST, SMALLEST = 1e9, 1e-9  # m, kg, s, N m, ...: beyond, products leave the numbers; chosen
+
+
+def _not_tiny(value: float) -> float:
+    if 0 < value < SMALLEST:
+        raise broken_rule("", value, f"a number of at least {SMALLEST:g}")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0), AfterValidator(_not_tiny)]
 NonNegative = Annotated[float, Field(ge=0)]
 Share = Annotated[float, Field(gt=0, le=1)]
 Point = tuple[float, float]
@@ -38,9 +48,11 @@ EVERY = "all"  # as a name in a dotted key: every element of an array of tables
 
 
 class Section(BaseModel):
-    """A table of a file: frozen, finite numbers, no unknown keys."""
+    """A table of a file: frozen, finite numbers (of at most LARGEST in size where they are sizes),
+    no unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    sizes: ClassVar[bool] = True
 
 
 def broken_rule(key: str, value: Any, expected: str) -> PydanticCustomError:
@@ -104,9 +116,18 @@ def tables_of(text: str, file: str) -> dict[str, Any]:
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Tables of a TOML file with ``overrides`` (dotted keys) applied. Raises ProblemError."""
     data = tables_of(read_text(path), str(path))
-    for key, value in (overrides or {}).items():
+    for key, value in changes_of(overrides, str(path)):
         set_key(data, key, value, str(path))
     return data
+
+
+def changes_of(overrides: Mapping[str, Any] | None, file: str) -> list[tuple[str, Any]]:
+    """Dotted keys and their values. Raises ProblemError for what is no mapping of texts."""
+    if overrides is None:
+        return []
+    if not isinstance(overrides, Mapping) or not all(isinstance(key, str) for key in overrides):
+        raise ProblemError(file, "overrides", overrides, "dotted keys and their values")
+    return list(overrides.items())
 
 
 def set_key(data: dict[str, Any], dotted: str, value: Any, file: str) -> None:
@@ -163,6 +184,8 @@ def validated(model: type[Model], data: Mapping[str, Any], file: str) -> Model:
     if "source" in data:
         raise ProblemError(file, "source", data["source"], "no such key: it is set by the loader")
     try:
+        if getattr(model, "sizes", False):
+            _require_sizes(data, (), file)
         # Through JSON, because only there does strict mode take arrays for tuples.
         text = json.dumps({**data, "source": file}, default=_as_json)
         return model.model_validate_json(text, strict=True)
@@ -172,6 +195,17 @@ def validated(model: type[Model], data: Mapping[str, Any], file: str) -> Model:
         if isinstance(error, ProblemError):
             raise
         raise ProblemError(file, "file", str(error), "tables of plain values") from None
+
+
+def _require_sizes(value: Any, place: tuple[int | str, ...], file: str) -> None:
+    if isinstance(value, Mapping):
+        for name, part in value.items():
+            _require_sizes(part, (*place, str(name)), file)
+    elif isinstance(value, (list, tuple)):
+        for i, part in enumerate(value):
+            _require_sizes(part, (*place, i), file)
+    elif isinstance(value, (int, float)) and LARGEST < abs(value) < math.inf:
+        raise ProblemError(file, _joined(place), value, f"a number of at most {LARGEST:g} in size")
 
 
 def translated(error: ValidationError, file: str, model: type[BaseModel]) -> ProblemError:

@@ -35,7 +35,8 @@ class Obstacle:
     deviation: float = 0.0
 
     def __post_init__(self) -> None:
-        require_finite("obstacle", [*self.centre, *self.velocity])
+        require_finite("obstacle.centre", self.centre, "m", (2,))
+        require_finite("obstacle.velocity", self.velocity, "m/s", (2,))
         for name in ("radius", "deviation"):
             require_not_negative(f"obstacle.{name}", getattr(self, name))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.arrays import Array, require_positive
+from trajopt.arrays import Array, require_finite, require_positive, require_rising
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.forces import contact_points
 from trajopt.paths.samples import PathSamples
@@ -24,11 +24,8 @@ class FrictionAlong:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        if not self.places or np.any(~(np.diff(self.places) > 0)):
-            raise ArgumentError("friction.places", self.places, "increasing path parameters, m")
-        if len(self.values) != len(self.places):
-            raise ArgumentError("friction.values", self.values, "one coefficient a place")
-        require_positive("friction.values", self.values)
+        places = require_rising("friction.places", self.places, "path parameters, m")
+        require_positive("friction.values", self.values, "a place", places.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +41,10 @@ class FrictionMap:
     origin: tuple[float, float]
 
     def __post_init__(self) -> None:
-        if np.ndim(self.values) != 2 or min(np.shape(self.values)) < 2:
-            shape = np.shape(self.values)
-            raise ArgumentError("friction.values", shape, "shape (rows, columns), at least 2 x 2")
-        require_positive("friction.values", self.values)
+        values = require_positive("friction.values", self.values, "on a grid", (None, None))
+        if min(values.shape) < 2:
+            raise ArgumentError("friction.values", values.shape, "at least 2 x 2 values")
+        require_finite("friction.origin", self.origin, "m", (2,))
         require_positive("friction.spacing", self.spacing, "m between grid points")
 
     def at(self, x: Array, y: Array, s: Array) -> Array:
@@ -71,7 +68,8 @@ Friction = float | tuple[float, ...] | FrictionAlong | FrictionMap
 def require_friction(argument: str, friction: Friction) -> None:
     """Raises ArgumentError unless it is a coefficient > 0, several, or one of the classes here."""
     if not isinstance(friction, (FrictionAlong, FrictionMap)):
-        require_positive(argument, friction, "(friction coefficient)")
+        shape = () if np.ndim(friction) == 0 else (None,)
+        require_positive(argument, friction, "(friction coefficient)", shape)
 
 
 def coefficients(argument: str, friction: Friction, path: PathSamples, robot: Robot) -> Array:

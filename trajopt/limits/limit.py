@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
@@ -67,7 +67,7 @@ def speed_rows(name: str, rate: Array, largest: float) -> Rows:
 
 def require_each_positive(argument: str, values: float | tuple[float, ...], unit: str) -> None:
     """Raises ArgumentError unless every value is > 0, and one at least is finite."""
-    array = np.asarray(values, dtype=np.float64)
+    array = as_numbers(argument, values, f"finite values > 0 {unit}")
     if array.ndim > 1 or not array.size or not (np.all(array > 0) and np.isfinite(array).any()):
         raise ArgumentError(argument, values, f"finite values > 0 {unit}")
 

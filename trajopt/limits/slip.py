@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trajopt.arrays import Array
-from trajopt.errors import ArgumentError
+from trajopt.arrays import Array, require_whole
 from trajopt.limits.forces import Affine, contact_loads, specific_force
 from trajopt.limits.friction import Friction, coefficients, edges, require_friction
 from trajopt.limits.grip import contact_forces, holds_of
@@ -44,10 +43,9 @@ class Slip:
 
     def __post_init__(self) -> None:
         require_friction(f"{self.name}.friction", self.friction)
-        if self.sides < 4:
-            raise ArgumentError(
-                f"{self.name}.sides", self.sides, "4 or more sides of the friction polygon"
-            )
+        require_whole(
+            f"{self.name}.sides", self.sides, 4, "4 or more sides of the friction polygon"
+        )
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         shares, sizes, robot = [], [], require_robot(self.name, robot)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, require_finite, require_not_negative, require_rising
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Rows
 from trajopt.paths.samples import PathSamples
@@ -28,11 +28,10 @@ class SpeedZones:
     name: str = "speed_zones"
 
     def __post_init__(self) -> None:
-        for i, zone in enumerate(self.zones):
-            if len(zone) != 3 or not np.all(np.isfinite(zone)) or zone[1] <= zone[0] or zone[2] < 0:
-                raise ArgumentError(
-                    f"{self.name}.zones[{i}]", zone, "(from, to > from, speed >= 0), m and m/s"
-                )
+        name, expected = f"{self.name}.zones", "(from, to > from, speed >= 0), m and m/s, each"
+        for i, zone in enumerate(require_finite(name, self.zones, expected, (None, 3))):
+            if not (zone[0] < zone[1] and zone[2] >= 0):
+                raise ArgumentError(f"{name}[{i}]", zone.tolist(), expected)
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         bound = np.full(len(path.s), np.inf)
@@ -56,15 +55,8 @@ class SpeedProfile:
     name: str = "speed_profile"
 
     def __post_init__(self) -> None:
-        if (
-            not self.places
-            or not np.all(np.isfinite(self.places))
-            or np.any(np.diff(self.places) <= 0)
-        ):
-            raise ArgumentError(f"{self.name}.places", self.places, "increasing path parameters, m")
-        speeds = np.asarray(self.speeds, dtype=np.float64)
-        if len(speeds) != len(self.places) or not np.all(np.isfinite(speeds)) or np.any(speeds < 0):
-            raise ArgumentError(f"{self.name}.speeds", self.speeds, "one speed >= 0 m/s a place")
+        places = require_rising(f"{self.name}.places", self.places, "path parameters, m")
+        require_not_negative(f"{self.name}.speeds", self.speeds, "m/s a place", places.shape)
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:  # noqa: ARG002
         return _bound(

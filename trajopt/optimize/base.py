@@ -20,7 +20,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, BoolArray, IntArray, as_numbers
+from trajopt.arrays import Array, BoolArray, IntArray, as_numbers, require_positive, require_whole
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective
 
@@ -60,16 +60,14 @@ class Budget:
     clock: Literal["wall", "cpu"] = "wall"
 
     def __post_init__(self) -> None:
-        whole = isinstance(self.evaluations, (int, np.integer)) and not isinstance(
-            self.evaluations, bool
-        )
-        if self.evaluations is not None and not (whole and self.evaluations >= 1):
-            raise ArgumentError(
-                "budget.evaluations", self.evaluations, "a whole number >= 1, or None"
-            )
-        if self.seconds is not None and not (_is_real(self.seconds) and 0 < self.seconds < np.inf):
-            raise ArgumentError("budget.seconds", self.seconds, "a finite time > 0 s, or None")
-        if self.target is not None and not (_is_real(self.target) and not np.isnan(self.target)):
+        if self.evaluations is not None:
+            expected = "a whole number >= 1, or None"
+            require_whole("budget.evaluations", self.evaluations, 1, expected)
+        if self.seconds is not None:
+            require_positive("budget.seconds", self.seconds, "s, or None")
+        if self.target is not None and np.isnan(
+            as_numbers("budget.target", self.target, "a cost, or None", ())
+        ):
             raise ArgumentError("budget.target", self.target, "a cost, or None")
         if self.clock not in ("wall", "cpu"):
             raise ArgumentError("budget.clock", self.clock, "wall or cpu")
@@ -441,10 +439,6 @@ def checked_bounds(bounds: ArrayLike, dimension: int | None = None) -> Array:
     if dimension is not None and len(array) != dimension:
         raise ArgumentError("bounds", array.shape, f"{dimension} rows, one a decision variable")
     return array
-
-
-def _is_real(value: object) -> bool:
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
 def checked_x0(x0: ArrayLike | None, bounds: Array) -> Array | None:

@@ -274,9 +274,9 @@ def _arrangement_vertices(part: AffinePart, box: Array) -> Array:
             low = ends @ row + offset
             high = low + row[axis] * (box[axis, 1] - box[axis, 0])
             for end, a, b in zip(ends, low, high, strict=True):
-                turns = np.arange(
-                    np.ceil(min(a, b) / part.period), np.floor(max(a, b) / part.period) + 1
-                )
+                first, last = np.ceil(min(a, b) / part.period), np.floor(max(a, b) / part.period)
+                some = (first + last) / 2 + np.array([-0.5, 0.5]) * _MOST_TURNS
+                turns = np.arange(max(first, np.ceil(some[0])), min(last, some[1]) + 1)
                 points = np.tile(end, (len(turns), 1))
                 points[:, axis] += (turns * part.period - a) / row[axis]
                 found.append(points)

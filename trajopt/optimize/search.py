@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
+from trajopt.arrays import require_whole
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult, checked_bounds
@@ -110,8 +111,7 @@ def minimize(
     """
     box = checked_bounds(bounds)
     problem = as_objective(objective, box)
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise ArgumentError("seed", seed, "a whole number >= 0")
+    require_whole("seed", seed, 0, "a whole number >= 0")
     chosen = automatic(problem) if optimizer == "auto" else optimizer
     method = (
         optimizer_named(chosen)

@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from trajopt.problem.model import Problem, change_key
-from trajopt.schema import json_schema, read_tables, validated
+from trajopt.schema import changes_of, json_schema, read_tables, validated
 
 
 def load_problem(file: str | FilePath, overrides: Mapping[str, Any] | None = None) -> Problem:
@@ -16,7 +16,7 @@ def load_problem(file: str | FilePath, overrides: Mapping[str, Any] | None = Non
     Raises ProblemError, in one line: file, key, value, and what would be right.
     """
     data = read_tables(file)
-    for key, value in (overrides or {}).items():
+    for key, value in changes_of(overrides, str(file)):
         change_key(data, key, value, str(file))
     return validated(Problem, data, str(file))
 

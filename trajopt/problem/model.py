@@ -31,7 +31,15 @@ from trajopt.problem.robot import RobotSection, robot_of, robot_tables
 from trajopt.problem.surroundings import ObstacleSection
 from trajopt.problem.task import ActuatorSection, Goal, ObjectiveSection, Space, Spline, Start
 from trajopt.robots.robot import Robot
-from trajopt.schema import Point3, Section, as_problem_error, broken_rule, set_key, validated
+from trajopt.schema import (
+    Point3,
+    Section,
+    as_problem_error,
+    broken_rule,
+    changes_of,
+    set_key,
+    validated,
+)
 from trajopt.world.laid import lay
 from trajopt.world.scene import Scene
 
@@ -216,7 +224,7 @@ class Problem(Section):
         ProblemError.
         """
         data = self.tables()
-        for key, value in (changes or {}).items():
+        for key, value in changes_of(changes, self.source):
             change_key(data, key, value, self.source)
         for name, value in sections.items():
             if isinstance(value, Mapping) and isinstance(data.get(name), dict):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, BoolArray, require_positive
+from trajopt.arrays import Array, BoolArray, as_numbers, require_positive, require_whole
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.optimize.ipopt import numpy_on_symbols, smooth_table, solve_program, stacked, variables
@@ -65,7 +65,7 @@ class SmoothMotion:
 
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """s, s', s'' and s''' at times t (N,), s. Raises ArgumentError outside [0, duration]."""
-        time = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        time = np.atleast_1d(as_numbers("t", t, f"times in [0, {self.duration!r}] s"))
         if not np.all((time >= -1e-9) & (time <= self.duration * (1 + 1e-12) + 1e-9)):
             raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
         i = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.jerk) - 1)
@@ -113,8 +113,7 @@ def limit_jerk(
     no motion or the slow-down is too large.
     """
     require_positive("jerk", jerk, "m/s^3")
-    if nodes < 10:
-        raise ArgumentError("nodes", nodes, "10 or more nodes")
+    require_whole("nodes", nodes, 10, "10 to 10,000 nodes", 10_000)
     if trajectory.sd[0] > 1e-9 or trajectory.sd[-1] > 1e-9:
         raise ArgumentError(
             "trajectory",

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, require_finite, require_positive, require_whole
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.limits.limit import Limit
 from trajopt.optimize.ipopt import (
@@ -101,9 +101,11 @@ def optimize_path(
     the most programs solved. Locally optimal; never slower than two stages. Raises ArgumentError
     for bounds that exclude 0, and InfeasibleError when the path at z = 0 cannot be timed.
     """
-    box = np.asarray(bounds, dtype=np.float64)
-    if box.ndim != 2 or box.shape[1] != 2 or np.any(box[:, 0] > 0) or np.any(box[:, 1] < 0):
+    box = require_finite("bounds", bounds, "(d, 2) with 0 inside, m", (None, 2))
+    if np.any(box[:, 0] > 0) or np.any(box[:, 1] < 0):
         raise ArgumentError("bounds", box.tolist(), "(d, 2) with 0 inside")
+    require_positive("trust", trust, "m")
+    require_whole("steps", steps, 1, "a whole number >= 1")
     z = np.zeros(len(box))
 
     def used(path: Path) -> Sequence[Limit]:

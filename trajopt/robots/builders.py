@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from trajopt.arrays import require_whole
+
 Tables = dict[str, Any]
 MECANUM_ANGLES = (-math.pi / 4, math.pi / 4, math.pi / 4, -math.pi / 4)  # rad: FL, FR, RL, RR
 CORNERS = (
@@ -156,6 +158,7 @@ def omni(
 ) -> Tables:
     """``count`` driven omni wheels at ``distance`` from the origin, evenly from the angle ``first``
     on, each rolling around the centre, counter-clockwise."""
+    require_whole("omni.count", count, 3, "a whole number of wheels, 3 to 100", 100)
     wheels = []
     for i in range(count):
         at = first + 2 * math.pi * i / count

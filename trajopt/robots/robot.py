@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, require_finite
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.robots.description import RobotDescription, WheelSection
 from trajopt.robots.wheel import Row, Wheel, WheelKind, kinematic, null_space, outline, wheel_rates
-from trajopt.schema import read_tables, set_key, validated
+from trajopt.schema import changes_of, read_tables, set_key, validated
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, [iso80000-3]
 DATA = Path(__file__).parent / "data"  # the shipped robots
@@ -86,7 +86,7 @@ class Robot:
         """Copy with changed dotted keys ({"body.mass": 20.0}), checked like a file; None takes a
         key out. Raises ProblemError."""
         data = self.description.model_dump(mode="json", exclude_none=True)
-        for key, value in changes.items():
+        for key, value in changes_of(changes, self.description.source):
             set_key(data, key, value, self.description.source)
         return Robot.of(data, self.description.source)
 
@@ -269,27 +269,27 @@ class Robot:
     @classmethod
     def differential(cls, **sizes: Any) -> Robot:
         """Two driven wheels on one axle and a free castor; see ``builders.differential``."""
-        return cls.of(_builder("differential")(**sizes))
+        return cls.of(_built("differential", sizes))
 
     @classmethod
     def car(cls, **sizes: Any) -> Robot:
         """Two fixed rear wheels, two steered front wheels; see ``builders.car``."""
-        return cls.of(_builder("car")(**sizes))
+        return cls.of(_built("car", sizes))
 
     @classmethod
     def mecanum(cls, **sizes: Any) -> Robot:
         """Four Mecanum wheels; see ``builders.mecanum``."""
-        return cls.of(_builder("mecanum")(**sizes))
+        return cls.of(_built("mecanum", sizes))
 
     @classmethod
     def omni(cls, **sizes: Any) -> Robot:
         """Omni wheels evenly around the centre; see ``builders.omni``."""
-        return cls.of(_builder("omni")(**sizes))
+        return cls.of(_built("omni", sizes))
 
     @classmethod
     def swerve(cls, **sizes: Any) -> Robot:
         """Four driven, steered wheels; see ``builders.swerve``."""
-        return cls.of(_builder("swerve")(**sizes))
+        return cls.of(_built("swerve", sizes))
 
 
 def robot(name: str, overrides: Mapping[str, Any] | None = None) -> Robot:
@@ -313,7 +313,13 @@ def robot_names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in DATA.glob("*.toml")))
 
 
-def _builder(name: str) -> Any:
+def _built(builder: str, sizes: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables of a builder. Raises ArgumentError for sizes that are no numbers."""
     from trajopt.robots import builders
 
-    return getattr(builders, name)
+    for name, value in sizes.items():
+        if name != "name":
+            points = {"cog": (3,), "chassis": (3,), "chassis_place": (2,), "castor": (2,)}
+            require_finite(f"{builder}.{name}", value, "", points.get(name, ()))
+    tables: dict[str, Any] = getattr(builders, builder)(**sizes)
+    return tables

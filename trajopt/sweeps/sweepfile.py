@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, JsonValue
@@ -49,6 +49,8 @@ def _list(value: Any) -> Any:
 class SweepFile(Section):
     """A sweep file. ``time_limit`` of a case, s; ``memory_limit`` of a case, bytes or a text such
     as "2 GB"; ``code`` says what code runs, instead of its source."""
+
+    sizes: ClassVar[bool] = False  # values are of any size
 
     source: str = ""
     title: str | None = None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, BoolArray
+from trajopt.arrays import Array, BoolArray, as_numbers, require_whole
 from trajopt.errors import ArgumentError
 from trajopt.paths.path import Path
 
@@ -17,6 +17,7 @@ _CELLS = (
     400  # intervals on a path when the caller does not say; chosen: refinement adds what is missing
 )
 _CELLS_PER_SEGMENT = 20  # at least this many on a spline segment; chosen
+_MOST = 1_000_000  # gridpoints that a caller may ask for; chosen
 _MERGE = 1e-12  # gridpoints closer than this share of the path's length are one
 
 
@@ -31,18 +32,14 @@ def initial_grid(path: Path, gridpoints: int | ArrayLike | None) -> Array:
     if gridpoints is None:
         cells = np.maximum(_CELLS_PER_SEGMENT, np.ceil(_CELLS * spans / spans.sum()))
     elif isinstance(gridpoints, (int, np.integer)):
-        if gridpoints < 2:
-            raise ArgumentError("gridpoints", gridpoints, "2 or more gridpoints")
+        require_whole("gridpoints", gridpoints, 2, f"a number from 2 to {_MOST}", _MOST)
         cells = np.maximum(1, np.round((gridpoints - 1) * spans / spans.sum()))
     else:
-        places = np.asarray(gridpoints, dtype=np.float64)
+        expected = f"path parameters in [0, {path.length:.6g}] m, or their number"
+        places = as_numbers("gridpoints", gridpoints, expected, (None,))
         tolerance = 1e-9 * path.length
-        if places.ndim != 1 or not np.all(
-            (places >= -tolerance) & (places <= path.length + tolerance)
-        ):
-            raise ArgumentError(
-                "gridpoints", places.tolist(), f"path parameters in [0, {path.length:.6g}] m"
-            )
+        if not np.all((places >= -tolerance) & (places <= path.length + tolerance)):
+            raise ArgumentError("gridpoints", places.tolist(), expected)
         return insert(path, knots, places)
     s0 = path.knot_parameters
     steps = [

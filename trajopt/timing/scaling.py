@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, as_numbers, require_not_negative
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
@@ -186,21 +186,22 @@ def _job(
     if len(set(names)) < len(names):
         raise ArgumentError("limits", names, "limits with different names (pass name=...)")
     for argument, speed in zip(("start_speed", "end_speed"), speeds, strict=True):
-        if isinstance(speed, (str, bool)) or not (0 <= speed <= _FASTEST):
+        if require_not_negative(argument, speed, "m/s") > _FASTEST:
             raise ArgumentError(argument, speed, f"a path speed from 0 to {_FASTEST:g} m/s")
     require_engine(engine)
     along = track(path, robot, ground, start[1])
     path = along.path
-    places = np.atleast_1d(np.asarray(stops, dtype=np.float64))
+    expected = f"path parameters between 0 and {path.length:.6g} m"
+    places = np.atleast_1d(as_numbers("stops", stops, expected))
     if places.ndim != 1 or not np.all((places > 0) & (places < path.length)):
-        raise ArgumentError("stops", stops, f"path parameters between 0 and {path.length:.6g} m")
+        raise ArgumentError("stops", stops, expected)
     if engine == "linear" and (any(speeds) or len(places)):
         raise ArgumentError(
             "start_speed, end_speed, stops",
             (*speeds, *places),
             "0 and none: linear scaling takes the path's own speeds",
         )
-    wheels = np.asarray(start[0], dtype=np.float64)
+    wheels = as_numbers("start_wheels", start[0], "wheel angles, rad")
     squares = speeds[0] ** 2, speeds[1] ** 2
     return _Job(along, tuple(limits), *squares, places, engine, wheels)
 

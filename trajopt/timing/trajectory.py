@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, IndexArray
+from trajopt.arrays import Array, IndexArray, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
@@ -128,7 +128,7 @@ class Trajectory:
         """At times t (N,): which interval between gridpoints and the time since it was entered; the
         gridpoint at which the robot waits, -1 while it moves, and the time since it came to rest
         there."""
-        time = np.atleast_1d(np.asarray(t, dtype=np.float64))
+        time = np.atleast_1d(as_numbers("t", t, f"times in [0, {self.duration!r}] s"))
         slack = _ON_TIME * self.duration
         if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
             raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, require_finite, require_positive
+from trajopt.arrays import Array, as_numbers, require_between, require_finite, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
@@ -46,9 +46,8 @@ class HeightMap:
     def __post_init__(self) -> None:
         require_grid("ground.heights", self.heights)
         require_positive("ground.spacing", self.spacing, "m between grid points")
-        require_finite("ground.origin", self.origin, "m")
-        if not 0 < self.grade < np.pi / 2:
-            raise ArgumentError("ground.grade", self.grade, "an angle between 0 and pi/2 rad")
+        require_finite("ground.origin", self.origin, "m", (2,))
+        require_between("ground.grade", self.grade, 0.0, np.pi / 2, "rad")
 
     @property
     def size(self) -> tuple[float, float]:
@@ -159,9 +158,10 @@ class HeightMap:
 
 def require_grid(argument: str, heights: Array) -> None:
     """Raises ArgumentError unless ``heights`` (rows, columns) make a map."""
-    shape = np.shape(heights)
-    if len(shape) != 2 or min(shape) < 2:
-        raise ArgumentError(argument, shape, "heights of shape (rows, columns), at least 2 x 2")
+    expected = "heights of shape (rows, columns), at least 2 x 2"
+    shape = as_numbers(argument, heights, expected, (None, None)).shape
+    if min(shape) < 2:
+        raise ArgumentError(argument, shape, expected)
     if shape[0] * shape[1] > LARGEST_GRID:
         too_large(argument, shape)
     if not np.all(np.isfinite(heights)):

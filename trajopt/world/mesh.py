@@ -10,7 +10,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from trajopt.arrays import Array, BoolArray, require_positive
+from trajopt.arrays import (
+    Array,
+    BoolArray,
+    as_numbers,
+    require_between,
+    require_finite,
+    require_positive,
+)
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
@@ -39,15 +46,12 @@ class Mesh:
 
     def __post_init__(self) -> None:
         require_positive("ground.spacing", self.spacing, "m between points of the mesh's map")
-        shape = np.shape(self.vertices)
-        if len(shape) != 2 or shape[1] != 3 or not np.all(np.isfinite(self.vertices)):
-            raise ArgumentError("ground.vertices", shape, "finite numbers of shape (V, 3), m")
-        shape, count = np.shape(self.faces), len(self.vertices)
-        if len(shape) != 2 or shape[1] != 3 or shape[0] < 1:
-            raise ArgumentError("ground.faces", shape, "indices of shape (F, 3)")
-        if np.min(self.faces) < 0 or np.max(self.faces) >= count:
-            value = (int(np.min(self.faces)), int(np.max(self.faces)))
-            raise ArgumentError("ground.faces", value, f"indices from 0 to {count - 1}")
+        require_between("ground.grade", self.grade, 0.0, np.pi / 2, "rad")
+        count = len(require_finite("ground.vertices", self.vertices, "(V, 3), m", (None, 3)))
+        expected = f"indices (F, 3) from 0 to {count - 1}"
+        faces = as_numbers("ground.faces", self.faces, expected, (None, 3))
+        if not len(faces) or np.min(faces) < 0 or np.max(faces) >= count or np.any(faces % 1):
+            raise ArgumentError("ground.faces", self.faces, expected)
 
     @property
     def grain(self) -> float:

@@ -6,10 +6,13 @@ A new shape is one class here and one line in ``OBSTACLES``.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Protocol
+from typing import Any, Protocol
+
+from trajopt.arrays import require_finite, require_positive
+from trajopt.errors import ArgumentError
 
 Point = tuple[float, float]
 _ROUND = 48  # corners of a circle's outline; chosen: 0.2 % of the radius outside it
@@ -41,6 +44,10 @@ class Step:
     width: float
     depth: float
 
+    def __post_init__(self) -> None:
+        _check(self, ("height", "width", "depth"), ("place",))
+        require_finite(f"{self.name}.direction", self.direction, "rad")
+
     @property
     def normal(self) -> Point:
         """Unit vector into the step."""
@@ -68,6 +75,11 @@ class Wall:
     end: Point
     thickness: float
 
+    def __post_init__(self) -> None:
+        _check(self, ("height", "thickness"), ("start", "end"))
+        if tuple(self.start) == tuple(self.end):
+            raise ArgumentError(f"{self.name}.end", self.end, "a point different from start")
+
     @property
     def outline(self) -> tuple[Point, ...]:
         (x0, y0), (x1, y1) = self.start, self.end
@@ -85,6 +97,9 @@ class Circle:
     centre: Point
     radius: float
 
+    def __post_init__(self) -> None:
+        _check(self, ("height", "radius"), ("centre",))
+
     @property
     def outline(self) -> tuple[Point, ...]:
         """A polygon around the circle."""
@@ -101,9 +116,21 @@ class Polygon:
     height: float
     corners: tuple[Point, ...]
 
+    def __post_init__(self) -> None:
+        _check(self, ("height",), ())
+        require_finite(f"{self.name}.corners", self.corners, "(K, 2), m", (None, 2))
+
     @property
     def outline(self) -> tuple[Point, ...]:
         return self.corners
+
+
+def _check(thing: Any, lengths: Sequence[str], points: Sequence[str]) -> None:
+    """Raises ArgumentError unless lengths are > 0 and points finite."""
+    for name in lengths:
+        require_positive(f"{thing.name}.{name}", getattr(thing, name), "m")
+    for name in points:
+        require_finite(f"{thing.name}.{name}", getattr(thing, name), "x, y, m", (2,))
 
 
 OBSTACLES: Mapping[str, type] = MappingProxyType(

@@ -8,8 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, require_finite
-from trajopt.errors import ArgumentError
+from trajopt.arrays import Array, require_between, require_finite
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
 
@@ -27,8 +26,7 @@ class Plane:
 
     def __post_init__(self) -> None:
         require_finite("plane.direction", self.direction, "rad")
-        if not abs(self.slope) < np.pi / 2:
-            raise ArgumentError("plane.slope", self.slope, "an angle between -pi/2 and pi/2 rad")
+        require_between("plane.slope", self.slope, -np.pi / 2, np.pi / 2, "rad")
 
     lines: ClassVar[tuple[Line, ...]] = ()
     grain: ClassVar[float] = np.inf

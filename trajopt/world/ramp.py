@@ -45,7 +45,9 @@ class Ramp:
     def __post_init__(self) -> None:
         for name in ("run", "rounding"):
             require_positive(f"ramp.{name}", getattr(self, name), "m")
-        require_finite("ramp", [*self.place, self.direction, self.height])
+        require_finite("ramp.place", self.place, "m", (2,))
+        for name in ("direction", "height"):
+            require_finite(f"ramp.{name}", getattr(self, name))
         if self.edge not in _MEANS:
             raise ArgumentError("ramp.edge", self.edge, "'mean' or 'smooth'")
 

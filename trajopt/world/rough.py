@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from trajopt.arrays import require_not_negative
+from trajopt.arrays import require_between, require_not_negative, require_positive
 from trajopt.errors import ArgumentError
 from trajopt.world.height_map import LARGEST_GRID, HeightMap
 
@@ -37,8 +37,8 @@ def rough_ground(
         ("flat_radius", flat_radius),
     ):
         require_not_negative(name, value, "m")
-    if not (np.isfinite(size) and np.isfinite(spacing) and 0 < spacing < size):
-        raise ArgumentError("spacing", (spacing, size), "0 < spacing < size, m")
+    require_positive("size", size, "m")
+    require_between("spacing", spacing, 0.0, size, "m, the size")
     count = round(size / spacing) + 1
     if count**2 > LARGEST_GRID:
         raise ArgumentError("spacing", spacing, f"at most {LARGEST_GRID} mesh points in {size:g} m")

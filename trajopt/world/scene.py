@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from trajopt.arrays import require_positive
 from trajopt.errors import ArgumentError
 from trajopt.world.ground import Ground
 from trajopt.world.obstacles import Obstacle
@@ -26,8 +26,7 @@ class Scene:
     friction_varies: bool = False
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.friction) and self.friction > 0):
-            raise ArgumentError("scene.friction", self.friction, "a coefficient > 0")
+        require_positive("scene.friction", self.friction, "(coefficient)")
         if not hasattr(self.ground, "height"):
             raise ArgumentError("scene.ground", self.ground, "the shape of the ground, as Flat()")
         names = [obstacle.name for obstacle in self.obstacles]
