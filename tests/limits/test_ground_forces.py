@@ -7,6 +7,7 @@ import pytest
 from limits.slopes import GENTLE, G, along_of
 
 from trajopt.limits.forces import contact_loads, contact_points, ground_moment, specific_force
+from trajopt.limits.grip import contact_forces, holds_of
 from trajopt.paths.path import Path
 from trajopt.robots.robot import robot, robot_names
 from trajopt.timing.track import track
@@ -97,6 +98,38 @@ def test_a_heading_of_its_own_on_a_plane_in_closed_form(name):
         np.testing.assert_allclose(force.a, np.tile(axes @ travel, (2, 1)), atol=1e-9)
         np.testing.assert_allclose(force.b, 0.0, atol=1e-9)
         np.testing.assert_allclose(force.c, np.tile(G * axes[:, 2], (2, 1)), atol=1e-9)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> float:
+    return float(a[0] * b[1] - a[1] * b[0])
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_forces_of_wheels_are_the_least_that_give_force_and_yaw_moment(name):
+    """On a tilted plane, at a random state: their sums are those of the motion, driven castors do
+    not turn their pivots, and no other forces that do so are smaller."""
+    one, rng = robot(name), np.random.default_rng(len(name))
+    on = track(Path.through(GENTLE), one, Plane(0.3, 0.8))
+    s = rng.uniform(0.2, 4.0, 6)
+    samples = on.samples(s, on.path.locate(s))
+    sdd, sd2 = rng.uniform(-1, 1, 6), rng.uniform(0, 1, 6)
+    forces = contact_forces(samples, one).at(sdd, sd2)
+    push = specific_force(samples, one.body).at(sdd, sd2)
+    turn = ground_moment(samples, one.body).at(sdd, sd2)[:, 2]
+    assert samples.wheels is not None
+    holds, wheels = holds_of(one), one.description.wheels
+    for i in range(len(s)):
+        at, rows = samples.wheels.contacts[i], []
+        for k, extra in zip(holds.wheel, holds.direction, strict=True):
+            angle = wheels[k].angle + samples.wheels.steering[i, k] + extra
+            way = np.array([np.cos(angle), np.sin(angle)])
+            arm, lever = at[k] - one.body.cog[:2], at[k] - np.array(wheels[k].position)
+            pivots = [cross(lever, way) * (k in group) for group in holds.free]
+            rows.append([*way, cross(arm, way), *pivots])
+        matrix = np.array(rows).T
+        wanted = [push[i, 0], push[i, 1], turn[i], *[0.0] * len(holds.free)]
+        np.testing.assert_allclose(matrix @ forces[i], wanted, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.pinv(matrix) @ wanted, forces[i], atol=1e-9)
 
 
 def test_over_a_crest_the_load_falls_and_pitching_takes_a_moment():

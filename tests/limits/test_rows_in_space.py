@@ -33,15 +33,32 @@ GROUNDS = {"plane": TILTED, "hills": HILLS, "mesh": mesh_of(HILLS), "ramp": SMOO
 POINTS = np.array([[0, 0], [1, 0.3], [2, 0.2], [3, -0.3]])
 
 
+# motors that drive some of the wheels: free steered ones hold across, one castor of two pushes
+DRIVES = {
+    "rear-drive car": ("car", ["rear-left", "rear-right"]),
+    "castor-drive powerbot": ("powerbot", ["left", "castor-left", "right"]),
+    "two-drive swerve": ("swerve", ["front-left", "rear-right"]),
+}
+
+
+def robot_of(name: str) -> Robot:
+    if name not in DRIVES:
+        return robot(name)
+    kind, wheels = DRIVES[name]
+    return robot(
+        kind, {"motors": [{"name": f"drive {w}", "wheels": [w], "torque": 9.0} for w in wheels]}
+    )
+
+
 @cache
 def driven(name: str, ground: str) -> Track:
     """With a centre of gravity off the middle, and of its own heading where the robot can."""
-    one = robot(name)
+    one = robot_of(name)
     x, y, z = one.body.cog
     one = one.replace({"body.cog": [x + 0.01, y + 0.02, z + 0.05]})
     free = one.drivable.shape[1] == 3
     path = Path.through(
-        POINTS if free else POINTS * [1.2, 0.3],
+        POINTS if free else POINTS * [1.2, 0.6],
         heading=[0.2, 1.0, 0.1, -0.7] if free else None,
         turning_length=0.5,
     )
@@ -87,7 +104,7 @@ def share_of(rows: Rows, sdd: float, sd2: float) -> float:
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
-@pytest.mark.parametrize("name", robot_names())
+@pytest.mark.parametrize("name", [*robot_names(), *DRIVES])
 def test_rows_are_what_motions_in_space_need(name, ground):
     on, rng = driven(name, ground), np.random.default_rng(len(name))
     one = on.robot

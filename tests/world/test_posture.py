@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from world.shapes import GROUNDS, HILLS, PATHS, TILTED
+from world.shapes import GROUNDS, HILLS, PATHS, TILTED, mesh_of
 
-from trajopt.errors import ArgumentError
+from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.paths.samples import sample_path
 from trajopt.world.laid import lay
+from trajopt.world.mesh import Mesh
 from trajopt.world.posture import frame_on, samples_of, samples_on, twist_bend
 from trajopt.world.terrain import Flat
 
@@ -134,3 +135,32 @@ def test_wheels_stand_on_the_plane_nearest_to_the_ground_under_them(kind, contac
         assert found.position[i, 2] == pytest.approx(z, abs=1e-12)
         up = np.array([-a, -b, 1.0]) / np.sqrt(1 + a * a + b * b)
         np.testing.assert_allclose(found.rotation[i, :, 2], up, atol=1e-12)
+
+
+def test_wheels_that_leave_the_ground_are_refused_with_place():
+    """Though the robot's origin stays on it: past each edge of a map, and over a hole of a mesh."""
+    size = HILLS.size
+    (x0, y0), (x1, y1) = HILLS.origin, np.add(HILLS.origin, size)
+    for start, end in (
+        ([x0 + 0.25, 0.0], [x0 + 1.0, 0.0]),
+        ([x1 - 1.0, 0.0], [x1 - 0.25, 0.0]),
+        ([0.0, y0 + 0.15], [1.0, y0 + 0.15]),
+        ([0.0, y1 - 0.15], [1.0, y1 - 0.15]),
+    ):
+        path = lay(Path.through([start, end]), HILLS)
+        with pytest.raises(InfeasibleError, match="none under a wheel") as caught:
+            samples_on(HILLS, path, *(2 * [np.linspace(path.start, path.end, 30)]), CORNERS)
+        assert caught.value.place in (0.0, pytest.approx(path.length, abs=0.06))
+        inner = lay(Path.through(np.array([start, end]) * 0.9), HILLS)
+        samples_on(HILLS, inner, *(2 * [np.linspace(inner.start, inner.end, 30)]), CORNERS)
+    whole = mesh_of(HILLS)
+    centres = whole.vertices[whole.faces].mean(axis=1)
+    hole = np.hypot(centres[:, 0] - 1.0, centres[:, 1] - 0.2) > 0.15
+    torn = Mesh(whole.vertices, whole.faces[hole], whole.spacing)
+    path = lay(Path.through([[0.0, 0.0], [2.5, 0.0]]), torn)
+    u = np.linspace(path.start, path.end, 60)
+    samples_on(whole, path, u, u, CORNERS)
+    with pytest.raises(InfeasibleError, match="none under a wheel") as caught:
+        samples_on(torn, path, u, u, CORNERS)
+    x = float(path.position(path.locate([caught.value.place]))[0, 0])
+    assert x + 0.3 == pytest.approx(0.85, abs=0.15)

@@ -165,6 +165,22 @@ def test_knots_stand_where_a_path_crosses_lines_of_the_ground():
         assert np.abs(d).min() < 1e-12
 
 
+@pytest.mark.parametrize("edge", ["mean", "smooth"])
+def test_lines_are_where_derivatives_of_a_ramp_jump(edge):
+    ramp, order = Ramp((0.5, 0.3), 0.4, 2.0, 0.3, 0.4, edge), 2 if edge == "mean" else 4
+    ahead = np.array([np.cos(0.4), np.sin(0.4)])
+
+    def bend(d: np.ndarray) -> np.ndarray:
+        """Along the ramp, at distances d from the origin's parallel to its foot."""
+        x, y = d * ahead[0] + 0.7 * ahead[1], d * ahead[1] - 0.7 * ahead[0]
+        return ramp.rise(ramp.along(x, y), order)
+
+    places = np.array([line.distance for line in ramp.lines])
+    assert np.abs(bend(places + 1e-9) - bend(places - 1e-9)).min() > 0.01
+    between = (np.sort(places)[1:] + np.sort(places)[:-1]) / 2
+    np.testing.assert_allclose(bend(between + 1e-3), bend(between - 1e-3), atol=1e-9)
+
+
 def test_paths_off_the_ground_are_refused_with_place():
     flat = Path.through([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
     with pytest.raises(InfeasibleError, match="below the ground") as caught:

@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, BoolArray
 from trajopt.paths.path import Path
 
 
@@ -45,6 +45,10 @@ class Ground(Protocol):
     def partial(self, x: ArrayLike, y: ArrayLike, i: int, j: int) -> Array:
         """d^(i+j) h / dx^i dy^j, m^(1-i-j), i + j from 0 to 4. On a line: of the side that
         ``lines`` points to."""
+        ...
+
+    def covers(self, x: ArrayLike, y: ArrayLike) -> BoolArray:
+        """Whether there is ground at positions of any shape."""
         ...
 
     def check(self, path: Path) -> None:

@@ -15,7 +15,14 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, as_numbers, require_between, require_finite, require_positive
+from trajopt.arrays import (
+    Array,
+    BoolArray,
+    as_numbers,
+    require_between,
+    require_finite,
+    require_positive,
+)
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
@@ -100,6 +107,11 @@ class HeightMap:
         slope_y = np.where(left, z[2] - z[0], z[3] - z[1]) / self.spacing
         return np.where(in_x, slope_x, 0.0), np.where(in_y, slope_y, 0.0)
 
+    def covers(self, x: ArrayLike, y: ArrayLike) -> BoolArray:
+        sides = zip((x, y), self.origin, self.size, strict=True)
+        inside = [np.abs(np.asarray(v) - a - n / 2) <= n / 2 + 1e-9 for v, a, n in sides]
+        return np.asarray(inside[0] & inside[1])
+
     def check(self, path: Path) -> None:
         """Raises InfeasibleError with place where a path leaves the map, or is steeper than
         ``grade``."""
@@ -107,7 +119,7 @@ class HeightMap:
         s = np.linspace(0.0, path.length, count)
         p = path.position(path.locate(s))
         low = np.asarray(self.origin)
-        outside = np.any((p[:, :2] < low - 1e-9) | (p[:, :2] > low + self.size + 1e-9), axis=1)
+        outside = ~self.covers(p[:, 0], p[:, 1])
         if outside.any():
             i = int(np.argmax(outside))
             x1, y1 = low + self.size

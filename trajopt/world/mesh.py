@@ -63,16 +63,25 @@ class Mesh:
     def partial(self, x: ArrayLike, y: ArrayLike, i: int, j: int) -> Array:
         return self.map.partial(x, y, i, j)
 
+    def covers(self, x: ArrayLike, y: ArrayLike) -> BoolArray:
+        seen, low = self._seen, self.map.origin
+        row, column = (
+            (np.asarray(y) - low[1]) / self.spacing,
+            (np.asarray(x) - low[0]) / self.spacing,
+        )
+        i, j = (
+            np.clip(np.floor(v).astype(np.intp), 0, n - 2)
+            for v, n in zip((row, column), seen.shape, strict=True)
+        )
+        whole = seen[i, j] & seen[i + 1, j] & seen[i, j + 1] & seen[i + 1, j + 1]
+        return np.asarray(whole & self.map.covers(x, y))
+
     def check(self, path: Path) -> None:
         """Raises InfeasibleError where a path leaves the mesh, or is steeper than ``grade``."""
         self.map.check(path)
         s = np.linspace(0.0, path.length, int(2 * path.length / self.spacing) + 2)
         p = path.position(path.locate(s))
-        column, row = ((p[:, k] - self.map.origin[k]) / self.spacing for k in (0, 1))
-        i, j = np.floor(row).astype(np.intp), np.floor(column).astype(np.intp)
-        (rows, columns), seen = self._seen.shape, self._seen
-        i1, j1 = np.minimum(i + 1, rows - 1), np.minimum(j + 1, columns - 1)
-        open_ = ~(seen[i, j] & seen[i1, j] & seen[i, j1] & seen[i1, j1])
+        open_ = ~self.covers(p[:, 0], p[:, 1])
         if open_.any():
             at = int(np.argmax(open_))
             raise InfeasibleError(

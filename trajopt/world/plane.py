@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, require_between, require_finite
+from trajopt.arrays import Array, BoolArray, require_between, require_finite
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
 
@@ -57,6 +57,9 @@ class Plane:
             return self.height(x, y)
         value = self.gradient[0] * (i == 1) + self.gradient[1] * (j == 1) if i + j == 1 else 0.0
         return np.full(np.broadcast(x, y).shape, value)
+
+    def covers(self, x: ArrayLike, y: ArrayLike) -> BoolArray:
+        return np.ones(np.broadcast(x, y).shape, dtype=bool)
 
     def check(self, path: Path) -> None:
         """Every path fits."""

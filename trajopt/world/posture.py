@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError
+from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples
 from trajopt.paths.series import Series, Vector, cos_sin, cross, dot, scaled, unit
@@ -82,8 +82,8 @@ def frame_on(
     if ground.level:
         return _along(x.cut(order), y.cut(order), surface, own, pace.sqrt())
     if contacts is not None and ground.bends:
-        cos, sin = own if own is not None else _direction(x, y)
-        z, slope_x, slope_y = _plane_under(ground, x, y, cos, sin, contacts, order)
+        turn = own if own is not None else _direction(x, y)
+        z, slope_x, slope_y = _plane_under(ground, path, u, (x, y), turn, contacts)
     else:
         z = surface
         slope_x = compose(ground, *at, 1, 0, order - 1)
@@ -172,10 +172,18 @@ def _direction(x: Series, y: Series) -> tuple[Series, Series]:
 
 
 def _plane_under(
-    ground: Ground, x: Series, y: Series, cos: Series, sin: Series, contacts: Array, order: int
+    ground: Ground,
+    path: Path,
+    u: Array,
+    place: tuple[Series, Series],
+    turn: tuple[Series, Series],
+    contacts: Array,
 ) -> tuple[Series, Series, Series]:
     """Height at the origin and slopes along x and y of the plane through the heights under the
-    wheels, least squares."""
+    wheels, least squares; ``turn``: cosine and sine of the heading. Raises InfeasibleError, with
+    place, where there is no ground under a wheel."""
+    (x, y), (cos, sin) = place, turn
+    order = x.order - 1
     count = len(contacts)
     weights = np.column_stack([np.ones(count), contacts])
     if count < 3 or np.linalg.matrix_rank(weights, tol=1e-9) < 3:
@@ -184,7 +192,16 @@ def _plane_under(
     fit = np.linalg.pinv(weights)
     found = [Series(np.zeros((order + 1, *x.c[0].shape))) for _ in range(3)]
     for (a, b), share in zip(contacts, fit.T, strict=True):
-        h = compose(ground, x + cos * a - sin * b, y + sin * a + cos * b, 0, 0, order)
+        px, py = x + cos * a - sin * b, y + sin * a + cos * b
+        off = ~ground.covers(px.c[0], py.c[0])
+        if off.any():
+            i = int(np.argmax(off))
+            raise InfeasibleError(
+                "ground",
+                float(path.parameter(u[[i]])[0]),
+                f"there is none under a wheel, at ({px.c[0][i]:.3g}, {py.c[0][i]:.3g}) m",
+            )
+        h = compose(ground, px, py, 0, 0, order)
         found = [f + h * k for f, k in zip(found, share, strict=True)]
     height, along, across = found
     return height, along * cos - across * sin, along * sin + across * cos

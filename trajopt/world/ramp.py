@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, require_finite, require_positive
+from trajopt.arrays import Array, BoolArray, require_finite, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
@@ -125,6 +125,9 @@ class Ramps:
             share = np.cos(ramp.direction) ** i * np.sin(ramp.direction) ** j
             total = total + share * ramp.rise(ramp.along(x, y), i + j)
         return total
+
+    def covers(self, x: ArrayLike, y: ArrayLike) -> BoolArray:
+        return np.ones(np.broadcast(x, y).shape, dtype=bool)
 
     def check(self, path: Path) -> None:
         """Raises InfeasibleError where the path is steeper than the robot's grade."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, BoolArray
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
 
@@ -27,6 +27,9 @@ class Flat:
 
     def partial(self, x: ArrayLike, y: ArrayLike, i: int, j: int) -> Array:  # noqa: ARG002
         return self.height(x, y)
+
+    def covers(self, x: ArrayLike, y: ArrayLike) -> BoolArray:
+        return np.ones(np.broadcast(x, y).shape, dtype=bool)
 
     def check(self, path: Path) -> None:
         """Every path fits."""
