@@ -165,9 +165,7 @@ def _branch(
             _refuse_range(steering, g, float(turns[best]), reach)
         shift[count + g] = turns[best]
         for k in (place[int(i)] for i in members):
-            near = first + turns[best] if np.isnan(before[k]) else before[k]
-            near = near if len(members) == 1 else first + turns[best]
-            shift[k] = np.pi * np.round((near - angles[0, k]) / np.pi)
+            shift[k] = np.pi * np.round((first + turns[best] - angles[0, k]) / np.pi)
     return shift
 
 
