@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from trajopt.errors import InfeasibleError
 from trajopt.limits.acceleration import Acceleration
@@ -73,9 +74,14 @@ def test_a_range_is_judged_between_the_places_of_the_table(path: Path) -> None:
 
 
 def test_the_radius_that_would_do_holds_for_a_wheel_off_the_middle() -> None:
-    # The tricycle's wheel moved to the left: 1 / kappa = y + x / tan(angle)
+    # The wheel stands to the left, and at its angle 0 it is turned by 0.2 rad: 1 / kappa = y + x / tan(angle)
     left = robot(
-        "tricycle", {"wheels.front.position": [0.65, 0.1], "steering.0.range": [-0.5, 0.5]}
+        "tricycle",
+        {
+            "wheels.front.position": [0.65, 0.1],
+            "wheels.front.angle": 0.2,
+            "steering.0.range": [-0.7, 0.3],
+        },
     )
     turn = np.linspace(0, 1.2, 40)
     for radius, bound in ((0.9, 0.5), (-0.9, -0.5)):
@@ -128,6 +134,27 @@ def test_a_steering_rate_that_binds_makes_a_car_slower_and_says_so() -> None:
     middle = np.arctan(BASE * rate.at(time).twist[:, 2] / rate.at(time).twist[:, 0])
     pace = np.gradient(middle, time)
     assert np.abs(pace).max() == pytest.approx(0.04, rel=2e-3)
+
+
+def test_steering_takes_the_corners_of_curvature_within_a_milliradian() -> None:
+    largest = 0.5
+    pace = [Speed(3.0), Acceleration(2.0, 2.0)]
+    found = time_scale(BEND, [*pace, SteeringAcceleration(largest)], robot=CAR)
+    knots = np.searchsorted(found.u, BEND.basis.knots[1:-1])
+    times, h = found.times[knots], 1e-6
+    middle = []
+    for sign in (-1, 1):  # rate of the angle in the middle, on either side of the knots
+        ends = [found.at(times + sign * x).twist for x in (h, 2 * h)]
+        near, far = (np.arctan(BASE * twist[:, 2] / twist[:, 0]) for twist in ends)
+        middle.append(sign * (far - near) / h)
+    jump = np.abs(middle[1] - middle[0])
+    # a ramp of rate, evenly before and after the knot
+    ramp = jump / largest
+    deviation = [quad(lambda t, r=r: largest * (t + r / 2), -r / 2, 0)[0] for r in ramp]
+    assert max(deviation) == pytest.approx(1e-3, rel=5e-3)
+    assert "steering_acceleration" in {stretch.limit for stretch in found.active}
+    each = time_scale(BEND, [*pace, SteeringAcceleration((largest,))], robot=CAR)
+    assert each.duration == pytest.approx(found.duration, rel=1e-12)
 
 
 def test_rates_in_time_are_derivatives_of_angles() -> None:
