@@ -94,6 +94,8 @@ class Trajectory:
     @cached_property
     def rests(self) -> tuple[Rest, ...]:
         """Where steered wheels turn while the robot rests."""
+        if not (self.start_steering or (self.sd[1:-1] == 0).any()):
+            return ()
         return rests_of(self.track, self.limits)
 
     @cached_property
