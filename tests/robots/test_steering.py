@@ -215,3 +215,24 @@ def test_one_angle_tells_those_of_all_wheels_steered_with_it() -> None:
     with pytest.raises(ArgumentError, match="angles of all wheels of the steering 'front'"):
         given_angles(both, {0: 0.2})
     assert start_angles(steering_of(ASOC), {"module-1-left": 0.4}) == {0: 0.4, 1: 0.4}
+
+
+def test_angles_count_from_the_rolling_direction_of_the_file() -> None:
+    turned = {"wheels.front-left.angle": 0.5, "wheels.rear-right.angle": -0.4}
+    path = Path.through([[0, 0], [1, 0.3], [2, 0]], heading=[0.1, 0.6, 0.2], turning_length=0.35)
+    s = np.linspace(0, path.length, 7)
+    zero, off = np.zeros(4), np.array([0.5, 0, 0, -0.4])
+    found = [track(path, SWERVE.replace(turned if any(a) else {})) for a in (zero, off)]
+    here = [on.samples(s, path.locate(s)).wheels for on in found]
+    np.testing.assert_allclose(here[1].steering, here[0].steering - off, atol=1e-12)
+    np.testing.assert_allclose(here[1].spin, here[0].spin, atol=1e-12)
+    # car: one wheel's angle, told from its own zero, tells that of its pair and of the middle
+    car = steering_of(
+        CAR.replace({"wheels.front-left.angle": 0.3, "wheels.front-right.angle": 0.3})
+    )
+    plain = given_angles(steering_of(CAR), {0: 0.2})
+    np.testing.assert_allclose(given_angles(car, {0: -0.1}), plain - 0.3, atol=1e-12)
+    both = {"wheels.front-left.angle": 0.3, "wheels.front-right.angle": 0.1}
+    parallel = steering_of(CAR.replace({**both, "steering.front.rule": "parallel"}))
+    np.testing.assert_allclose(given_angles(parallel, {1: 0.2}), [0.0, 0.2, 0.0], atol=1e-12)
+    np.testing.assert_allclose(given_angles(parallel, {0: 0.2}), [0.2, 0.4, 0.2], atol=1e-12)

@@ -154,6 +154,9 @@ def course(
     is allowed here. Raises ArgumentError where the robot cannot brake at all at some speed up to
     the plan's (braking rows at s'' < 0 leave nothing): then no replanner can promise a stop.
     """
+    if trajectory.rests:
+        expected = "a plan whose wheels need not turn at rest on the way"
+        raise ArgumentError("trajectory", [rest.s for rest in trajectory.rests], expected)
     count = max(int(np.ceil(trajectory.path.length / _SPACING)) + 1, 3)
     s = np.linspace(0.0, trajectory.path.length, count)
     samples = trajectory.track.samples(s, trajectory.path.locate(s))

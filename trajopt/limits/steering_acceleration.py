@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from trajopt.limits.limit import (
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
+_CORNER = 1e-3  # rad, chosen: a tenth of what a steering may deviate from its plan
+
 
 @dataclass(frozen=True)
 class SteeringAcceleration:
@@ -25,6 +27,10 @@ class SteeringAcceleration:
     The angle of several wheels steered together is that of a wheel in their middle. The
     angle is a function of the path, so its acceleration is group_rate s'' + group_bend s'^2. Two
     rows a steering.
+
+    Where the rate itself jumps (a car's at the knots of a cubic spline, where curvature has a
+    corner) steering takes the corner: with its acceleration a, evenly before and after, the angle
+    deviates by jump^2 / (8 a) at most, which is bounded by 1 mrad, and so is the speed there.
     Raises ArgumentError unless ``largest`` > 0, for a robot that does not steer or whose file gives
     no acceleration where none is asked for, or without a robot.
     """
@@ -42,4 +48,6 @@ class SteeringAcceleration:
         least, shares = by_wheel(f"{self.name}.largest", asked, len(own))
         a, b = wheels.group_rate * shares, wheels.group_bend * shares
         a, b = np.hstack([a, -a]), np.hstack([b, -b])
-        return linear_rows(self.name, a, b, np.full_like(a, least), least)
+        with np.errstate(divide="ignore"):
+            corner = 8 * _CORNER * least / np.max(wheels.group_jump**2 * shares, axis=1)
+        return replace(linear_rows(self.name, a, b, np.full_like(a, least), least), sd2_max=corner)

@@ -120,6 +120,9 @@ def limit_jerk(
             (float(trajectory.sd[0]), float(trajectory.sd[-1])),
             "a motion from rest to rest",
         )
+    if trajectory.rests:
+        expected = "a motion whose wheels need not turn at rest on the way"
+        raise ArgumentError("trajectory", [rest.s for rest in trajectory.rests], expected)
     used = trajectory.limits if limits is None else limits
     source = replace(trajectory, limits=used)
     best: SmoothMotion | None = None

@@ -80,20 +80,24 @@ def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
                 at, k = divmod(int(np.abs(values[:, which]).argmax()), len(which))
                 value, wheel = values[at, which[k]], wheels[which[k]].name
                 found.append((f"{word} {quantity}, {wheel}", f"{value:.3f} {unit}", float(s[at])))
-    return found
+    return found + [("wheels turn at rest", f"{r.duration:.3f} s", r.s) for r in trajectory.rests]
 
 
 def binding_at(trajectory: Trajectory, times: Array) -> list[str]:
-    """Name of the limit that binds at each time (s), "" where none does."""
+    """Name of the limit that binds at each time (s), "" where none does, or where the robot rests
+    while wheels turn."""
     interval = np.clip(
         np.searchsorted(trajectory.times, times, side="right") - 1, 0, len(trajectory.sdd) - 1
     )
-    return [trajectory.binding[i] for i in interval]
+    left = trajectory.times[interval + 1] - times
+    waits = (left < trajectory.waits[interval + 1]) | (times < trajectory.times[0])
+    return ["" if w else trajectory.binding[i] for i, w in zip(interval, waits, strict=True)]
 
 
 def binding_shares(trajectory: Trajectory) -> dict[str, float]:
     """Share of the duration in which each limit binds, most first; "" for the rest is left out."""
-    steps, names = np.diff(trajectory.times) / trajectory.duration, np.array(trajectory.binding)
+    moving = np.diff(trajectory.times) - trajectory.waits[1:]
+    steps, names = moving / trajectory.duration, np.array(trajectory.binding)
     shares = {limit.name: float(steps[names == limit.name].sum()) for limit in trajectory.limits}
     return dict(sorted(((k, v) for k, v in shares.items() if v > 0), key=lambda item: -item[1]))
 

@@ -205,7 +205,7 @@ def band_times(trajectory: Trajectory) -> list[tuple[float, float, str]]:
     return [
         (
             float(np.interp(part.start, trajectory.s, trajectory.times)),
-            float(np.interp(part.end, trajectory.s, trajectory.times)),
+            float(np.interp(part.end, trajectory.s, trajectory.times - trajectory.waits)),
             part.limit,
         )
         for part in trajectory.active

@@ -38,6 +38,8 @@ class WheelStates:
     group_rate: Array  # (N, G) of the angle of each [[steering]], rad/m
     group_bend: Array  # (N, G) rad/m^2
     contacts: Array  # (N, K, 2) where the wheels stand in the body frame, m
+    # (N, G): by how much group_rate jumps there, >= 0, rad/m: at knots, where curvature has corners
+    group_jump: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +209,7 @@ class Steering:
             group_rate,
             group_bend,
             self.place - self.trail[:, None] * t + self.lateral[:, None] * n,
+            np.zeros_like(group_rate),
         )
 
     def castor_rates(self, twist: Array, twist_rate: Array, steering: Array) -> tuple[Array, Array]:
@@ -227,7 +230,7 @@ class Steering:
         spin[:, self.rolling] = twist @ inverse.T
         spin_rate[:, self.rolling] = twist_rate @ inverse.T
         none, contacts = np.zeros((len(twist), 0)), np.broadcast_to(self.place, (*shape, 2))
-        return WheelStates(zero, zero, zero, spin, spin_rate, none, none, contacts)
+        return WheelStates(zero, zero, zero, spin, spin_rate, none, none, contacts, none)
 
 
 @lru_cache(maxsize=64)

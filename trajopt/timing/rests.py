@@ -4,7 +4,7 @@ may."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,8 @@ from trajopt.limits.steering_acceleration import SteeringAcceleration
 from trajopt.limits.steering_rate import SteeringRate
 from trajopt.robots.steering import Steering
 from trajopt.timing.track import Track
+
+AT = 1e-9  # share of the path's length within which a gridpoint is a stop; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,17 @@ class Rest:
         pace = np.where(idle | (left <= 0) | (t[:, None] < 0), 0.0, rate / safe)
         mine, steered = np.array(self.group_of), np.array(self.group_of) >= 0
         return self.wheels * share[:, mine] * steered, self.wheels * pace[:, mine] * steered
+
+
+def with_rests(track: Track, limits: Sequence[Limit], u: Array, stops: Array) -> Track:
+    """The track with the gridpoints u (N,) that lie at ``stops`` (path parameters, m), where the
+    robot rests. Raises as ``rests_of``, and where steered wheels cannot stand as the path needs."""
+    if not track.steers:
+        return track
+    near = np.abs(track.path.parameter(u)[:, None] - stops).min(axis=1, initial=np.inf)
+    found = replace(track, rests=u[near <= AT * track.path.length])
+    rests_of(found, limits)
+    return found
 
 
 def rests_of(track: Track, limits: Sequence[Limit]) -> tuple[Rest, ...]:

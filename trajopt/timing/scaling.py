@@ -20,7 +20,7 @@ from trajopt.timing.feasibility import require_motion
 from trajopt.timing.grid import initial_grid, insert, split
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
-from trajopt.timing.rests import rests_of
+from trajopt.timing.rests import AT, with_rests
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
 from trajopt.timing.track import Track, track
@@ -33,7 +33,6 @@ REFINE_ABOVE = (
 REFINE_ROUNDS = 4  # rounds spent on that; chosen
 MOST_ROUNDS = 16  # rounds before giving up on a violation above the largest slow-down; chosen
 LARGEST_SLOWDOWN = 1.001  # of time; chosen
-_AT = 1e-9  # share of the path's length within which a gridpoint is a stop
 _KEPT = 1e-9  # relative violation that counts as none
 _TIGHTER = (
     0.0,
@@ -89,8 +88,7 @@ def time_scale(
     parameter, with the end speeds that the path gives it, so start and end speed must stay 0) and
     "segments" (below the speed of a factor for each spline segment). ``gridpoints``: how many, or
     path parameters (m); more are added where limits are broken between them. ``stops``: path
-    parameters (m) where the robot comes to rest on the way; where a steered wheel's pivot stands
-    still there and the path goes on in another direction, the wheel turns before the robot leaves
+    parameters (m) where the robot comes to rest on the way, and steered wheels turn if they must
     (``Trajectory.rests``). ``too_fast``: what to do where a bound
     on the speed alone (speed, zone, profile, wheel speed, yaw rate) lies below what braking from
     ``start_speed`` can reach, as when a zone appears in front of a moving robot: "refuse" raises
@@ -112,7 +110,8 @@ def time_scale(
     speeds, start = (start_speed, end_speed), (start_wheels, start_steering)
     job = _job(path, limits, robot, ground, speeds, engine, stops, start)
     u = insert(job.path, initial_grid(job.path, gridpoints), job.stops)
-    job = _with_rests(job, u)
+    rests = job.stops if start_speed > 0 or engine == "linear" else np.append(job.stops, 0.0)
+    job = replace(job, track=with_rests(job.track, job.limits, u, rests))
     _require_drivable(job, u)
     if too_fast == "brake" and start_speed > 0:
         job = replace(
@@ -206,18 +205,6 @@ def _job(
     return _Job(along, tuple(limits), *squares, places, engine, wheels)
 
 
-def _with_rests(job: _Job, u: Array) -> _Job:
-    """Its track with the gridpoints u where the robot rests. Raises InfeasibleError where steered
-    wheels cannot stand as the path needs."""
-    if not job.track.steers or job.engine == "linear":
-        return job
-    places = np.append(job.stops, 0.0) if job.start == 0 else job.stops
-    near = np.abs(job.path.parameter(u)[:, None] - places).min(axis=1, initial=np.inf)
-    along = replace(job.track, rests=u[near <= _AT * job.path.length])
-    rests_of(along, job.limits)
-    return replace(job, track=along)
-
-
 def _require_drivable(job: _Job, u: Array) -> None:
     """Raises InfeasibleError where the path has no direction, or the robot's wheels forbid its
     twist."""
@@ -248,7 +235,7 @@ def _stages(job: _Job, fine: FineRows, tighter: float) -> Stages:
         ceiling = np.minimum(ceiling, segment_ceiling(job.path, fine))
     if len(job.stops):
         near = np.abs(stages.s[:, None] - job.stops).min(axis=1)
-        ceiling = np.where(near <= _AT * job.path.length, 0.0, ceiling)
+        ceiling = np.where(near <= AT * job.path.length, 0.0, ceiling)
     return replace(stages, sd2_max=ceiling, c=stages.c - tighter if tighter else stages.c)
 
 

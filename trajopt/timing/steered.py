@@ -165,9 +165,7 @@ def _branch(
             _refuse_range(steering, g, float(turns[best]), reach)
         shift[count + g] = turns[best]
         for k in (place[int(i)] for i in members):
-            near = first + turns[best] if np.isnan(before[k]) else before[k]
-            near = near if len(members) == 1 else first + turns[best]
-            shift[k] = np.pi * np.round((near - angles[0, k]) / np.pi)
+            shift[k] = np.pi * np.round((first + turns[best] - angles[0, k]) / np.pi)
     return shift
 
 
@@ -182,7 +180,11 @@ class _Reach(NamedTuple):
 
 def _reach(path: Path, steering: Steering, motion: Motion, u: Array, angles: Array) -> _Reach:
     """Extremes of the groups' angles at places (P,) and between them, where a rate passes through
-    zero: vertices of the cubics that angles and rates at both ends of a cell make."""
+    zero: vertices of the cubics that angles and rates at both ends of a cell make. Without a range
+    nobody asks for them."""
+    if np.isinf(steering.ranges).all():
+        none = np.zeros(angles.shape[1])
+        return _Reach(none, none, motion(path.parameter(u[:1]), u[:1])[0], angles[:1])
     ends = np.stack([u[:-1], np.nextafter(u[1:], -np.inf)], axis=1).ravel()
     samples, bend = motion(path.parameter(ends), ends)
     assert bend is not None

@@ -57,7 +57,24 @@ class Track:
         if not steering.turns:
             return steering.rigid(samples.twist, samples.twist_rate)
         angles = self.turning.at(samples, bend)
-        return steering.states(samples.twist, samples.twist_rate, bend, angles)
+        found = steering.states(samples.twist, samples.twist_rate, bend, angles)
+        return replace(found, group_jump=self._jumps(samples.u)) if self.steers else found
+
+    def _jumps(self, u: Array) -> Array:
+        """(N, G): by how much the rates of steering jump at spline parameters (N,) that are knots,
+        or next before one."""
+        knots = np.asarray(self.path.basis.knots[1:-1])
+        after = np.where(np.isin(u, knots), u, np.nextafter(u, np.inf))
+        found = np.zeros((len(u), len(self.steering.groups)))
+        at = np.flatnonzero(np.isin(after, knots))
+        if len(at):
+            sides = np.concatenate([np.nextafter(after[at], -np.inf), after[at]])
+            samples, bend = self.motion(self.path.parameter(sides), sides)
+            assert bend is not None
+            motion = samples.twist, samples.twist_rate, bend
+            rate, _ = self.steering.turning_rates(self.steering.group_place, *motion)
+            found[at] = np.abs(rate[len(at) :] - rate[: len(at)])
+        return found
 
     @property
     def steering(self) -> Steering:

@@ -94,6 +94,8 @@ class Trajectory:
     @cached_property
     def rests(self) -> tuple[Rest, ...]:
         """Where steered wheels turn while the robot rests."""
+        if not (self.start_steering or (self.sd[1:-1] == 0).any()):
+            return ()
         return rests_of(self.track, self.limits)
 
     @cached_property
@@ -133,7 +135,8 @@ class Trajectory:
         if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
             raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
         i = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.sdd) - 1)
-        after = np.clip(time - self.times[i], 0.0, None)
+        moving = self.times[i + 1] - self.waits[i + 1] - self.times[i]
+        after = np.clip(time - self.times[i], 0.0, moving)
         node = np.where(time < self.times[0], 0, i + 1)
         since = time - (self.times[node] - self.waits[node])
         waits = (self.waits[node] > 0) & (since >= 0)
