@@ -61,7 +61,8 @@ def posture(rotation: Array) -> tuple[Array, Array]:
 
 def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
     """What is largest on the way, with its unit, and where (m): pitch and roll on ground that is
-    not level, angle and rate of the wheel that steers or swivels most."""
+    not level, angle and rate of the wheel that steers or swivels most; and rests in which wheels
+    turn."""
     times = np.linspace(0.0, trajectory.duration, _MOMENTS)
     state, s = trajectory.at(times), trajectory.along(times)[0]
     found = []
@@ -80,6 +81,8 @@ def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
                 at, k = divmod(int(np.abs(values[:, which]).argmax()), len(which))
                 value, wheel = values[at, which[k]], wheels[which[k]].name
                 found.append((f"{word} {quantity}, {wheel}", f"{value:.3f} {unit}", float(s[at])))
+    for rest in trajectory.rests:
+        found.append(("rest, while wheels turn", f"{rest.duration:.3f} s", rest.s))
     return found
 
 
@@ -93,7 +96,8 @@ def binding_at(trajectory: Trajectory, times: Array) -> list[str]:
 
 def binding_shares(trajectory: Trajectory) -> dict[str, float]:
     """Share of the duration in which each limit binds, most first; "" for the rest is left out."""
-    steps, names = np.diff(trajectory.times) / trajectory.duration, np.array(trajectory.binding)
+    moving = np.diff(trajectory.times) - trajectory.waits[1:]  # at a rest nothing binds
+    steps, names = moving / trajectory.duration, np.array(trajectory.binding)
     shares = {limit.name: float(steps[names == limit.name].sum()) for limit in trajectory.limits}
     return dict(sorted(((k, v) for k, v in shares.items() if v > 0), key=lambda item: -item[1]))
 
