@@ -187,7 +187,7 @@ def test_explain_says_that_a_slow_steering_costs_time():
     fast = trajopt("explain", car, "--set", "robot.steering.front.rate=4")
     seconds = [float(done.stdout.split(": ")[1].split(" s")[0]) for done in (slow, fast)]
     assert seconds[0] > seconds[1] + 1e-3
-    bound = [line for line in slow.stdout.splitlines() if line.endswith("steering_rate")]
+    bound = [line for line in slow.stdout.splitlines() if line.rstrip().endswith("steering_rate")]
     assert bound, slow.stdout
-    assert not [line for line in fast.stdout.splitlines() if line.endswith("steering_rate")]
+    assert not [line for line in fast.stdout.splitlines() if line.rstrip().endswith("steering_rate")]
     assert "steering rate, front-" in slow.stdout
