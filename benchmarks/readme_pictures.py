@@ -1,4 +1,4 @@
-"""The pictures that README.md shows.
+"""The pictures that README.md and docs/ground.md show.
 
 python -m benchmarks.readme_pictures                                rewrites docs/pictures/ but for
 the sweep python -m benchmarks.readme_pictures --climb out/sweeps/climb_rate  the two of the climb
@@ -21,6 +21,11 @@ from trajopt.sweeps.store import open_store
 
 FOLDER = Path("docs/pictures")
 PROBLEM = Path("problems/smdw/scenario_1_lateral.toml")
+# Of docs/ground.md: problem, picture of its run folder, name here.
+ON_GROUND = (
+    (Path("problems/car/hill.toml"), "loads.png", "hill_loads.png"),
+    (Path("problems/asoc/field.toml"), "path.png", "field_path.png"),
+)
 
 
 def approach() -> None:
@@ -35,6 +40,15 @@ def approach() -> None:
         for picture in ("path.png", "profile.png", "physics.png"):
             shutil.copy(folder / picture, FOLDER / picture)
             print(f"wrote {FOLDER / picture}")
+
+
+def on_ground() -> None:
+    """Solve problems on sloping ground, and keep a picture of each."""
+    for file, picture, kept in ON_GROUND:
+        with tempfile.TemporaryDirectory() as name:
+            save_pictures(solve(load_problem(file)), name)
+            shutil.copy(Path(name) / picture, FOLDER / kept)
+            print(f"wrote {FOLDER / kept}")
 
 
 def climb_rates(store: Path) -> None:
@@ -68,6 +82,7 @@ def main() -> None:
         climb_rates(options.climb)
     else:
         approach()
+        on_ground()
 
 
 if __name__ == "__main__":

@@ -157,3 +157,37 @@ def test_every_command_takes_problem_and_folder_of_every_kind(file, tmp_path):
 @pytest.mark.parametrize("group", ["sweep", "bench"])
 def test_groups_are_mounted(group):
     assert trajopt(group, "--help").returncode == 0
+
+
+@pytest.mark.parametrize("robot", ["asoc", "loc8"])
+def test_two_robots_drive_the_same_field_with_the_same_commands(robot, tmp_path):
+    """Castors and Mecanum wheels over one height map: solve, explain, export, compare."""
+    path, out, orders = f"problems/{robot}/field.toml", tmp_path / "run", tmp_path / "orders.csv"
+    problem = load_problem(ROOT / path)
+    other = load_problem(ROOT / "problems/loc8/field.toml")
+    np.testing.assert_array_equal(problem.scene.ground.heights, other.scene.ground.heights)
+    done = trajopt("solve", path, "--out", out, "--no-pictures")
+    assert done.returncode == 0, done.stderr
+    table = pd.read_csv(out / "trajectory.csv")
+    x, y, z = (table[f"{axis}_m"].to_numpy() for axis in "xyz")
+    # the body stands on the mean of the heights under its wheels, less what tilt takes
+    assert np.abs(z - problem.scene.ground.height(x, y)).max() < 0.02
+    assert np.ptp(z) > 0.04
+    told = trajopt("explain", out)
+    assert told.returncode == 0, told.stderr
+    assert "pitch" in told.stdout
+    assert ("castor rate" in told.stdout) == (robot == "asoc")
+    assert trajopt("export", out, "--out", orders).returncode == 0
+    assert len(pd.read_csv(orders).columns) == 1 + len(problem.robot.wheel_names)
+
+
+def test_explain_says_that_a_slow_steering_costs_time():
+    car = "problems/car/lane_change.toml"
+    slow = trajopt("explain", car)
+    fast = trajopt("explain", car, "--set", "robot.steering.front.rate=4")
+    seconds = [float(done.stdout.split(": ")[1].split(" s")[0]) for done in (slow, fast)]
+    assert seconds[0] > seconds[1] + 1e-3
+    bound = [line for line in slow.stdout.splitlines() if line.rstrip().endswith("steering_rate")]
+    assert bound, slow.stdout
+    assert not [line for line in fast.stdout.splitlines() if line.rstrip().endswith("steering_rate")]
+    assert "steering rate, front-" in slow.stdout

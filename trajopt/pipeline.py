@@ -121,7 +121,8 @@ def _timed(
             bound, manner = problem.profile.bound, problem.profile.manner
             timed = follow(path, bound, limits, manner=manner, **around).trajectory
         else:
-            timed = time_scale(path, limits, engine=engine, **around)
+            stops = () if problem.path_section is None else problem.path_section.stops
+            timed = time_scale(path, limits, engine=engine, stops=stops, **around)
     except InfeasibleError as error:
         return Solution(problem, path, None, error, searched)
     return Solution(problem, timed.path, timed, None, searched)

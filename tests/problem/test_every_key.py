@@ -261,6 +261,7 @@ ROWS = {
     "path.heading": Row("free", "along", 'none, or heading = "free"'),
     "path.headings": Row("free", [0.0, 0.3, 0.1], motion),
     "path.spacing": Row("path", "uniform", motion),
+    "path.stops": Row("path", [0.7], motion),
     "path.start_heading": Row("ramp", -3.1, motion),
     "path.start_rate": Row("ramp", 1.0, motion),
     "path.goal_heading": Row("ramp", -3.1, motion),

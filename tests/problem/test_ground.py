@@ -173,6 +173,25 @@ def test_speed_zones(folder: Path) -> None:
     assert timed.sd.max() > 0.5
 
 
+def test_a_swerve_turns_its_wheels_at_a_stop(folder: Path) -> None:
+    """A corner that none can drive through: at rest the wheels turn by a quarter turn."""
+    given = {
+        "robot": {"name": "swerve", "steering": {"all": {"rate": 2.0}}},
+        "path": {"points": [[0.0, 0.0], [2.0, 1.0]], "heading": "free", "headings": [0.0, 0.0]},
+        "start": {"steering": dict.fromkeys(("front-left", "rear-right"), 0.0)},
+    }
+    solution = solve(problem_in(folder, **given))
+    assert solution.trajectory is not None
+    first = solution.trajectory.rests[0]
+    turned = np.arctan2(1.0, 2.0)
+    assert (first.s, first.duration) == (0.0, pytest.approx(turned / 2.0))
+    still = {**TABLES["path"], "stops": [1.0]}
+    stopped = solve(problem_in(folder, path=still)).trajectory
+    assert stopped is not None
+    at = np.interp(1.0, stopped.s, stopped.sd)
+    assert at == pytest.approx(0.0, abs=1e-9)
+
+
 def test_castors_start_as_the_file_says(folder: Path) -> None:
     problem = problem_in(folder, start={"steering": {"castor-left": 1.0, "castor-right": -0.5}})
     solution = solve(problem)
@@ -237,7 +256,7 @@ WRONG: dict[str, tuple[dict[str, Any], str, str]] = {
     "values that lack": (
         {"ground": {"friction_along": {"places": [0.0, 0.5], "values": [0.3]}}},
         "ground.friction_along.values",
-        "one coefficient a place",
+        "a finite value > 0 a place",
     ),
     "places beyond the path": (
         {"ground": {"friction_along": {"places": [0.0, 50.0], "values": [0.3, 0.4]}}},
@@ -354,7 +373,7 @@ WRONG: dict[str, tuple[dict[str, Any], str, str]] = {
     "rough and coarse": (
         ground(rough={**ROUGH, "spacing": 9.0}, grade=0.3),
         "ground.rough.spacing",
-        "0 < spacing < size",
+        "between 0 and 8 m, the size",
     ),
     "a seed of words": (
         ground(rough={**ROUGH, "seed": "now"}, grade=0.3),
@@ -396,6 +415,24 @@ WRONG: dict[str, tuple[dict[str, Any], str, str]] = {
         {"limits": {"speed": 1.0, "speed_zones": [{"start": 1.0, "end": 9.0, "speed": 0.1}]}},
         "limits.speed_zones[0].end",
         "up to the path's length",
+    ),
+    "stops that fall": (
+        {"path": {**TABLES["path"], "stops": [1.0, 0.5]}},
+        "path.stops",
+        "increasing",
+    ),
+    "a stop beyond the path": (
+        {"path": {"points": [[0.0, 0.0], [2.0, 0.0]], "stops": [2.0]}},
+        "path.stops",
+        "before the path's end, 2 m",
+    ),
+    "a stop with a profile": (
+        {
+            "path": {**TABLES["path"], "stops": [1.0]},
+            "profile": {"places": [0.0], "speeds": [0.5]},
+        },
+        "path.stops",
+        "none with [profile]",
     ),
     "a share of all the load": ({"limits": {"contact": 1.0}}, "limits.contact", "less than 1"),
 }

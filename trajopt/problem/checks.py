@@ -133,6 +133,9 @@ def _path(problem: Problem) -> None:
         expected = "none: the path starts at its first point"
         raise broken_rule("start.pose", list(problem.start.pose), expected)
     assert problem.path_section is not None
+    if problem.path_section.stops and problem.profile is not None:
+        expected = "none with [profile]: a speed of 0 there is a stop"
+        raise broken_rule("path.stops", list(problem.path_section.stops), expected)
     steers = all(wheel.kind != "fixed" for wheel in problem.robot.rolling)
     if problem.path_section.heading == "free" and not (problem.robot.holonomic or steers):
         expected = f"\"along\": '{problem.robot.name}' cannot move in every direction"
@@ -142,9 +145,13 @@ def _path(problem: Problem) -> None:
     except ArgumentError as error:
         raise broken_rule(f"path.{error.argument}", error.value, error.expected) from None
     places = list(_places(problem))
-    if places:
+    if places or problem.path_section.stops:
         with suppress(InfeasibleError):  # which solve reports
             length = problem.path.length
+    stops = problem.path_section.stops
+    if stops and stops[-1] >= length:
+        expected = f"path parameters before the path's end, {length:.6g} m"
+        raise broken_rule("path.stops", list(stops), expected)
     for key, value, last in places:
         if last > length * (1 + 1e-6):
             expected = f"path parameters up to the path's length, {length:.6g} m"

@@ -42,8 +42,16 @@ class PathSection(Section):
     goal_heading: float | None = Field(None, description="the same at the last point, rad")
     goal_rate: Positive | None = Field(None, description="the same at the last point, m a unit")
 
+    stops: tuple[Positive, ...] = Field(
+        (),
+        description="path parameters, m, increasing, where the robot comes to rest on the way; "
+        "steered wheels may turn there",
+    )
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if any(b <= a for a, b in itertools.pairwise(self.stops)):
+            raise broken_rule("stops", list(self.stops), "increasing path parameters, m")
         if (self.points is None) == (self.file is None):
             raise broken_rule("points", self.points, "points or file, one of them")
         for end in ("start", "goal"):

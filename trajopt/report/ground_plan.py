@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Polygon, Rectangle
+from matplotlib.ticker import MaxNLocator
 
 from trajopt.arrays import Array
 from trajopt.problem.task import Space
@@ -20,6 +21,7 @@ _NOSE = 0.22  # share of the robot's length that the mark of its front takes, ch
 _AROUND = 1.0  # m, around a motion in which heights are drawn, chosen
 _PLACES = 200  # along x and y, where heights are read, chosen
 _LEVELS = 9  # contour lines, about; chosen
+_FLAT = 1e-6  # m, chosen: above rounding
 _ROOM = 0.15  # m, around a motion in which obstacles are drawn, chosen
 
 
@@ -119,10 +121,14 @@ def draw_scene(axes: Axes, scene: Scene, seen: Array) -> None:
 def _draw_heights(axes: Axes, ground: Ground, seen: Array) -> None:
     low, high = seen.min(axis=0) - _AROUND, seen.max(axis=0) + _AROUND
     x, y = np.meshgrid(*(np.linspace(low[k], high[k], _PLACES) for k in (0, 1)))
-    lines = axes.contour(
-        x, y, ground.height(x, y), levels=_LEVELS, colors=BROWN, linewidths=0.6, zorder=0.3
-    )
-    axes.clabel(lines, fmt="%g", fontsize=6.5)
+    z = ground.height(x, y)
+    levels = MaxNLocator(_LEVELS).tick_values(float(z.min()), float(z.max()))
+    inner = (levels > z.min() + _FLAT) & (levels < z.max() - _FLAT)  # no lines on level stretches
+    if inner.any():
+        lines = axes.contour(
+            x, y, z, levels=levels[inner], colors=BROWN, linewidths=0.6, zorder=0.3
+        )
+        axes.clabel(lines, fmt="%g", fontsize=6.5)
     axes.plot([], [], color=BROWN, linewidth=0.6, label="height of the ground, m")
 
 

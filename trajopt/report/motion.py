@@ -61,7 +61,8 @@ def posture(rotation: Array) -> tuple[Array, Array]:
 
 def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
     """What is largest on the way, with its unit, and where (m): pitch and roll on ground that is
-    not level, angle and rate of the wheel that steers or swivels most."""
+    not level, angle and rate of the wheel that steers or swivels most; and rests in which wheels
+    turn."""
     times = np.linspace(0.0, trajectory.duration, _MOMENTS)
     state, s = trajectory.at(times), trajectory.along(times)[0]
     found = []
@@ -80,23 +81,22 @@ def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
                 at, k = divmod(int(np.abs(values[:, which]).argmax()), len(which))
                 value, wheel = values[at, which[k]], wheels[which[k]].name
                 found.append((f"{word} {quantity}, {wheel}", f"{value:.3f} {unit}", float(s[at])))
-    return found + [("wheels turn at rest", f"{r.duration:.3f} s", r.s) for r in trajectory.rests]
+    for rest in trajectory.rests:
+        found.append(("rest, while wheels turn", f"{rest.duration:.3f} s", rest.s))
+    return found
 
 
 def binding_at(trajectory: Trajectory, times: Array) -> list[str]:
-    """Name of the limit that binds at each time (s), "" where none does, or where the robot rests
-    while wheels turn."""
+    """Name of the limit that binds at each time (s), "" where none does."""
     interval = np.clip(
         np.searchsorted(trajectory.times, times, side="right") - 1, 0, len(trajectory.sdd) - 1
     )
-    left = trajectory.times[interval + 1] - times
-    waits = (left < trajectory.waits[interval + 1]) | (times < trajectory.times[0])
-    return ["" if w else trajectory.binding[i] for i, w in zip(interval, waits, strict=True)]
+    return [trajectory.binding[i] for i in interval]
 
 
 def binding_shares(trajectory: Trajectory) -> dict[str, float]:
     """Share of the duration in which each limit binds, most first; "" for the rest is left out."""
-    moving = np.diff(trajectory.times) - trajectory.waits[1:]
+    moving = np.diff(trajectory.times) - trajectory.waits[1:]  # at a rest nothing binds
     steps, names = moving / trajectory.duration, np.array(trajectory.binding)
     shares = {limit.name: float(steps[names == limit.name].sum()) for limit in trajectory.limits}
     return dict(sorted(((k, v) for k, v in shares.items() if v > 0), key=lambda item: -item[1]))
