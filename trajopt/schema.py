@@ -23,6 +23,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic_core import PydanticCustomError
 
 from trajopt.errors import ProblemError
+from trajopt.files import content_of
 
 Model = TypeVar("Model", bound=BaseModel)
 LARGEST, SMALLEST = 1e9, 1e-9  # m, kg, s, N m, ...: beyond, products leave the numbers; chosen
@@ -84,20 +85,12 @@ def as_problem_error(error: PydanticCustomError, file: str) -> ProblemError:
 def read_text(path: str | Path) -> str:
     """Text of a file, at most LARGEST_FILE bytes of it. Raises ProblemError."""
     try:
-        with open(Path(path), "rb") as file:  # a number would be an open file
-            data = file.read(LARGEST_FILE + 1)  # not more, also of a device without end
-        if len(data) > LARGEST_FILE:
-            raise ProblemError(str(path), "file", "larger", f"at most {LARGEST_FILE} bytes")
-        return data.decode()
+        return content_of(path, LARGEST_FILE).decode()
     except FileNotFoundError:
         raise ProblemError(str(path), "file", "missing", "an existing file (*.toml)") from None
-    except IsADirectoryError:
-        raise ProblemError(str(path), "file", "a directory", "a file (*.toml)") from None
     except UnicodeDecodeError as error:
         raise ProblemError(str(path), "file", str(error), "valid TOML in UTF-8") from None
     except (OSError, TypeError, ValueError) as error:
-        if isinstance(error, ProblemError):
-            raise
         raise ProblemError(str(path), "file", str(error), "a readable file (*.toml)") from None
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import random
 import shutil
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ from hypothesis import strategies as st
 
 import trajopt
 from tests.report.conftest import problem_file
-from trajopt.errors import ArgumentError, MissingDependencyError, ProblemError
+from trajopt.errors import ArgumentError, MissingDependencyError, TrajoptError
 from trajopt.optimize.search import optimizer_names
 from trajopt.provenance import commit, versions
 from trajopt.report.files import as_toml, finite
@@ -140,7 +142,9 @@ def test_equal_seeds_give_equal_bytes_but_for_the_run(
             "problem_file",
             "wall_time_s",
             "search_time_s",
+            "files",
         }
+        del summary["checksum"]
         text = (tmp_path / attempt / "summary.json").read_text(encoding="utf-8")
         texts.append(text[: text.index('"run": {')])
         assert json.loads(texts[-1].rstrip().rstrip(",") + "}") == summary  # run is the last key
@@ -308,7 +312,8 @@ def test_toml_text_says_what_it_was_given(table: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    "damage", ["no summary", "no timing", "other format", "missing key", "no json", "bad toml"]
+    "damage",
+    ["no summary", "no timing", "other format", "missing key", "no json", "bad toml", "no rows"],
 )
 def test_damaged_folders_are_refused_in_words(damage: str, exact: Solution, tmp_path: Path) -> None:
     folder = write_solution(exact, tmp_path / "run", seed=0)
@@ -317,6 +322,8 @@ def test_damaged_folders_are_refused_in_words(damage: str, exact: Solution, tmp_
         shutil.rmtree(folder)
     elif damage == "no timing":
         (folder / "timing.csv").unlink()
+    elif damage == "no rows":
+        (folder / "timing.csv").write_text("")
     elif damage == "bad toml":
         (folder / "problem.toml").write_text("title = ")
     elif damage == "no json":
@@ -328,8 +335,58 @@ def test_damaged_folders_are_refused_in_words(damage: str, exact: Solution, tmp_
             else {k: v for k, v in summary.items() if k != "search"}
         )
         (folder / "summary.json").write_text(json.dumps(changed))
-    with pytest.raises((ArgumentError, ProblemError), match="expected"):
+    with pytest.raises(TrajoptError, match=r"expected|damaged") as told:
         read_solution(folder)
+    assert str(folder) in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda t: t[: len(t) // 2], r"timing\.csv, row \d+ = '\d fields instead of 4'"),
+        (lambda t: t.replace(t.splitlines()[9].split(",")[1], "nan"), r"timing.csv, row 10 = .s_m"),
+        (lambda t: "".join(t.splitlines(True)[:9]), "timing.csv: damaged: its content"),
+        (lambda t: t.replace("s_m", "S"), r"timing\.csv, row 1 = 'its columns are u, S, "),
+        (lambda t: t.replace("0.1", "0_1"), r"timing\.csv, row \d+ = "),
+        (lambda t: t + '"', r"timing\.csv, row \d+ = "),
+        (lambda t: t.replace("0", "\0"), r"timing\.csv"),
+    ],
+)
+def test_damaged_tables_are_refused_with_file_and_row(
+    change: Callable[[str], str], told: str, exact: Solution, tmp_path: Path
+) -> None:
+    folder = write_solution(exact, tmp_path / "run", seed=0)
+    file = folder / "timing.csv"
+    file.write_text(change(file.read_text()))
+    with pytest.raises(TrajoptError, match=told):
+        read_solution(folder)
+
+
+def test_files_that_no_run_wrote_are_spared(exact: Solution, tmp_path: Path) -> None:
+    (tmp_path / "problem.toml").write_text("mine")
+    with pytest.raises(ArgumentError, match=r"without problem\.toml: no run"):
+        write_solution(exact, tmp_path, seed=0)
+    assert (tmp_path / "problem.toml").read_text() == "mine"
+
+
+def test_flipped_bits_of_a_run_folder_are_told(
+    exact: Solution, drifted: ValidationReport, tmp_path: Path
+) -> None:
+    write_solution(exact, tmp_path, seed=0)
+    write_validation(drifted, tmp_path, exact.problem.robot)
+    draw = random.Random(3)
+    for file in sorted(tmp_path.iterdir()):
+        content = file.read_bytes()
+        for _ in range(20):
+            bit = draw.randrange(8 * len(content))
+            changed = bytearray(content)
+            changed[bit // 8] ^= 1 << bit % 8
+            file.write_bytes(changed)
+            if changed.lower() != content.lower() or file.suffix != ".json":  # 1E5 is 1e5
+                with pytest.raises(TrajoptError, match=file.name):
+                    read_solution(tmp_path)
+        file.write_bytes(content)
+    read_solution(tmp_path)
 
 
 def test_a_file_in_the_way_is_refused(exact: Solution, tmp_path: Path) -> None:

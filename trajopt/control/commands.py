@@ -16,7 +16,7 @@ import numpy as np
 
 from trajopt.arrays import Array, fold, require_positive
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
+from trajopt.files import read_table, whole_file
 from trajopt.robots.robot import Robot
 from trajopt.robots.steering import steering_of
 from trajopt.timing.trajectory import Trajectory
@@ -169,33 +169,11 @@ def compare_log(trajectory: Trajectory, file: str | FilePath) -> Comparison:
 
 
 def _read_log(path: FilePath) -> Array:
-    try:
-        with path.open(newline="", encoding="utf-8") as stream:
-            reader = csv.DictReader(line for line in stream if not line.startswith("#"))
-            missing = [name for name in LOG_COLUMNS if name not in (reader.fieldnames or ())]
-            if missing:
-                raise ArgumentError(
-                    "log",
-                    str(path),
-                    "columns " + ", ".join(LOG_COLUMNS) + " (missing: " + ", ".join(missing) + ")",
-                )
-            rows = [[float(row[name]) for name in LOG_COLUMNS] for row in reader]
-    except FileNotFoundError:
-        raise ArgumentError("log", str(path), "an existing CSV file") from None
-    except (TypeError, ValueError) as error:
-        if isinstance(error, ArgumentError):
-            raise
-        raise ArgumentError("log", str(error), "numbers in every column") from None
-    log = np.array(rows, dtype=np.float64).reshape(-1, len(LOG_COLUMNS))
-    if (
-        len(log) < 2
-        or not np.all(np.isfinite(log))
-        or np.any(np.diff(log[:, 0]) <= 0)
-        or log[0, 0] < 0
-    ):
-        raise ArgumentError(
-            "log", str(path), "two or more rows of finite numbers, times rising from >= 0"
-        )
+    log = np.column_stack(list(read_table(path, LOG_COLUMNS).values()))
+    early = np.flatnonzero(np.diff(log[:, 0], prepend=-np.finfo(float).tiny) <= 0)
+    if len(log) < 2 or len(early):
+        found = f"{len(log)} rows" if len(log) < 2 else f"t = {log[early[0], 0]}"
+        raise ArgumentError(str(path), found, "two or more rows, times rising from t >= 0")
     return log
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
 from pathlib import Path as FilePath
@@ -12,6 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from trajopt.errors import ArgumentError
+from trajopt.files import read_table
 from trajopt.limits.speed_bound import SpeedProfile
 from trajopt.paths.path import Path
 from trajopt.schema import NonNegative, Point, Positive, Section, broken_rule
@@ -96,14 +96,12 @@ def read_points(
     """Points and yaws of a CSV file. Raises the broken rule of ``file``."""
     names = ("x", "y", "yaw") if with_yaw else ("x", "y")
     try:
-        with file.open(newline="", encoding="utf-8") as stream:
-            rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
-        table = np.array([[float(row[name]) for name in names] for row in rows])
-        if len(table) < 2 or not np.all(np.isfinite(table)):
-            raise ValueError("fewer than two rows, or numbers that are not finite")
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        table = np.column_stack(list(read_table(file, names).values()))
+    except ArgumentError as error:
         expected = f"a CSV file with columns {', '.join(names)} ({error})"
         raise broken_rule("path.file", str(file), expected) from None
+    if len(table) < 2:
+        raise broken_rule("path.file", str(file), "a CSV file of two rows or more")
     points = tuple((float(x), float(y)) for x, y in table[:, :2])
     _require_apart("path.file", points)
     return points, tuple(table[:, 2].tolist()) if with_yaw else None

@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
+from trajopt.files import LARGEST_TABLE, content_of, seal, unseal, whole_file
 
 
 def write_text(file: FilePath, text: str) -> None:
@@ -30,6 +30,11 @@ def write_json(file: FilePath, content: dict[str, Any]) -> None:
     )
 
 
+def write_sealed(file: FilePath, content: dict[str, Any]) -> None:
+    """As ``write_json``, with a checksum as the last key."""
+    write_text(file, seal(finite(content)))
+
+
 def write_table(file: FilePath, columns: Mapping[str, Any]) -> None:
     """Write columns of equal length as CSV, every bit of their numbers; NaN is an empty field."""
     import pandas as pd
@@ -38,22 +43,23 @@ def write_table(file: FilePath, columns: Mapping[str, Any]) -> None:
     write_text(file, text)
 
 
-def read_json(file: FilePath) -> dict[str, Any]:
-    """The object in a JSON file. Raises ArgumentError for a file that is missing or holds something
-    else."""
+def read_sealed(file: FilePath, version: int) -> dict[str, Any]:
+    """What ``write_sealed`` wrote, with that ``format``. Raises ArgumentError for a file that is
+    missing or holds something else, DamageError for one that was changed."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        text = content_of(file, LARGEST_TABLE)
+        content = json.loads(text)
     except (FileNotFoundError, NotADirectoryError):
         raise ArgumentError(
             "folder", str(file.parent), f"a folder with {file.name}, written by solve --out"
         ) from None
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ArgumentError(str(file), str(error), "valid JSON, as solve --out writes it") from None
-    if not isinstance(content, dict):
-        raise ArgumentError(
-            str(file), type(content).__name__, "a JSON object, as solve --out writes it"
-        )
-    return content
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != version:
+        expected = f"format = {version}; solve the problem again for a folder of this version"
+        raise ArgumentError(str(file), found, expected)
+    return unseal(text, str(file))
 
 
 def finite(value: Any) -> Any:

@@ -10,17 +10,14 @@ path and trajectory to the last bit.
 
 from __future__ import annotations
 
-import csv
-import zlib
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
 
 import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
-from trajopt.files import whole_file
+from trajopt.files import DamageError, checksums, read_table, require_unchanged, whole_file
 from trajopt.objectives.terminal import swarm_engine, terminal_objective
 from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
@@ -30,9 +27,9 @@ from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import (
     as_toml,
     made_folder,
-    read_json,
+    read_sealed,
     write_bytes,
-    write_json,
+    write_sealed,
     write_table,
     write_text,
 )
@@ -52,7 +49,7 @@ if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
 
 
-FORMAT = 2  # of the folder; a reader of another number refuses
+FORMAT = 3  # of the folder; a reader of another number refuses
 _OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png")
 _OF_A_SOLUTION = (
     "summary.json",
@@ -66,6 +63,10 @@ _OF_A_SOLUTION = (
     "loads.png",
     "convergence.png",
 )
+_TABLES = {  # columns that are read back, and those of them that may hold gaps
+    "timing.csv": (("u", "s_m", "s_dot_m_s", "s_ddot_m_s2"), ("s_ddot_m_s2",)),
+    "history.csv": (("evaluations", "cost", "violation", "seconds_s"), ("cost", "violation")),
+}
 
 
 def write_solution(
@@ -79,12 +80,17 @@ def write_solution(
     """Write a solution into ``folder`` (made if needed; an earlier run's files are replaced) and
     return it.
 
-    ``summary.json`` comes last, so a folder with one is complete. Equal seeds and budgets in
-    evaluations give equal bytes there outside the key "run". Without a trajectory there is no
-    trajectory.csv and timing.csv. ``pictures`` draws them too. Raises ArgumentError where the
-    folder cannot be written.
+    ``summary.json`` comes last, so a folder with one is complete; it holds checksums of the others
+    (but pictures) and of itself. Equal seeds and budgets in evaluations give equal bytes there
+    outside the keys "run" and "checksum". Without a trajectory there is no trajectory.csv and
+    timing.csv. ``pictures`` draws them too. Raises ArgumentError where the folder cannot be
+    written, or holds files of these names that no run wrote.
     """
     place, search, problem = made_folder(folder), solution.search, solution.problem
+    strange = [name for name in _OF_A_SOLUTION if (place / name).exists()]
+    if strange and "summary.json" not in strange:
+        expected = f"a folder without {', '.join(strange)}: no run that ended wrote this"
+        raise ArgumentError("folder", str(folder), expected)
     # Read first: the problem's file may stand in this folder itself.
     ground = {key: problem.folder / file for key, file in problem.ground.files.items()}
     stored = {key: (f"{key}{file.suffix}", file.read_bytes()) for key, file in ground.items()}
@@ -117,8 +123,11 @@ def write_solution(
         "problem_file": solution.problem.source,
         "wall_time_s": solution.wall_time,
         "search_time_s": None if search is None else search.seconds,
+        "files": checksums(
+            place, [n for n in (*_OF_A_SOLUTION, *names.values()) if n[-4:] != ".png"]
+        ),
     }
-    write_json(place / "summary.json", summary)
+    write_sealed(place / "summary.json", summary)
     return place
 
 
@@ -193,15 +202,22 @@ def read_solution(folder: str | FilePath) -> Solution:
     """The solution in a folder of ``write_solution``: numbers as written, path and trajectory
     rebuilt from them.
 
-    Raises ArgumentError where a file is missing or cannot be used, ProblemError for its
-    problem.toml.
+    Raises ArgumentError where summary.json is missing or of another format, DamageError where a
+    file of the run or of its check is not what was written.
     """
     place = FilePath(folder)
-    summary = read_json(place / "summary.json")
-    if summary.get("format") != FORMAT:
-        raise ArgumentError(
-            str(place / "summary.json"), summary.get("format"), f"format = {FORMAT}"
-        )
+    summary = read_sealed(place / "summary.json", FORMAT)
+    checks = [summary]
+    if (place / "validation.json").exists():
+        checks.append(read_sealed(place / "validation.json", FORMAT))
+    try:
+        for check in checks:
+            require_unchanged(place, check["run"]["files"])
+    except DamageError:
+        for name, (columns, free) in _TABLES.items():
+            if (place / name).exists():
+                read_table(place / name, columns, free)  # tells the row, where one is no row
+        raise
     problem = load_problem(place / "problem.toml")
     try:
         search = None if summary["search"] is None else _search(summary, place, problem)
@@ -268,8 +284,9 @@ def write_validation(report: ValidationReport, folder: str | FilePath, robot: Ro
         **run_facts(),
         "real_time_factor": report.real_time_factor,
         "wall_time_s": recording.wall_time,
+        "files": checksums(place, ["simulated.csv"]),
     }
-    write_json(place / "validation.json", summary)
+    write_sealed(place / "validation.json", summary)
     return place
 
 
@@ -323,7 +340,7 @@ def _infeasible(error: InfeasibleError | None) -> dict[str, Any] | None:
 def _trajectory(
     place: FilePath, path: Path, problem: Problem, timing: dict[str, Any]
 ) -> Trajectory:
-    table = _read_csv(place / "timing.csv", ("u", "s_m", "s_dot_m_s", "s_ddot_m_s2"))
+    table = read_table(place / "timing.csv", *_TABLES["timing.csv"])
     known = {limit.name: limit for limit in problem.limits}
     if problem.profile is not None:
         known[problem.profile.bound.name] = problem.profile.bound
@@ -354,14 +371,9 @@ def _history_table(history: History) -> dict[str, Any]:
 
 def _search(summary: dict[str, Any], place: FilePath, problem: Problem) -> OptimizeResult:
     facts, names = summary["search"], terminal_objective(problem).names
-    table = _read_csv(place / "history.csv", ("evaluations", "cost", "violation", "seconds_s"))
-    try:
-        with np.load(place / "explored.npz") as stored:
-            samples = stored["samples"]
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error) as error:
-        raise ArgumentError(
-            str(place / "explored.npz"), str(error), "the file that solve --out writes"
-        ) from None
+    table = read_table(place / "history.csv", *_TABLES["history.csv"])
+    with np.load(place / "explored.npz") as stored:
+        samples = stored["samples"]
     history = History(
         table["evaluations"].astype(np.int64),
         table["seconds_s"],
@@ -389,21 +401,6 @@ def _search(summary: dict[str, Any], place: FilePath, problem: Problem) -> Optim
 
 def _number(value: float | None, missing: float) -> float:
     return missing if value is None else float(value)
-
-
-def _read_csv(file: FilePath, columns: tuple[str, ...]) -> dict[str, Array]:
-    """Those columns of a table, every bit of their numbers; an empty field is NaN.
-
-    Raises ArgumentError where the table is another.
-    """
-    try:
-        with file.open(encoding="utf-8", newline="") as stream:
-            rows = list(csv.DictReader(stream))
-            return {name: np.array([float(row[name] or "nan") for row in rows]) for name in columns}
-    except (OSError, ValueError, KeyError) as error:
-        raise ArgumentError(
-            str(file), str(error), f"a table with columns {', '.join(columns)}"
-        ) from None
 
 
 def _write_samples(samples: Array, file: FilePath) -> None:

@@ -19,6 +19,7 @@ from trajopt.arrays import (
     require_positive,
 )
 from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.files import LARGEST_TABLE, content_of
 from trajopt.paths.path import Path
 from trajopt.world.ground import Line
 from trajopt.world.height_map import LARGEST_GRID, HeightMap
@@ -150,7 +151,7 @@ def load_mesh(file: str | FilePath, spacing: float, *, grade: float = np.pi / 3)
         raise ArgumentError("ground.file", str(path), "an existing .obj or .stl file")
     try:
         vertices, faces = readers[path.suffix.lower()](path)
-    except (ValueError, IndexError) as error:
+    except (OSError, ValueError, IndexError) as error:
         raise ArgumentError("ground.file", str(path), f"triangles ({error})") from error
     if not len(faces):
         raise ArgumentError("ground.file", str(path), "at least one triangle")
@@ -161,7 +162,7 @@ def _from_obj(path: FilePath) -> tuple[Array, NDArray[np.intp]]:
     """Lines ``v x y z`` and ``f a b c ...`` (from 1, or back from the last); polygons fan out."""
     vertices: list[list[float]] = []
     faces: list[list[int]] = []
-    for line in path.read_text().splitlines():
+    for line in content_of(path, LARGEST_TABLE).decode().splitlines():
         words = line.split()
         if words[:1] == ["v"]:
             vertices.append([float(w) for w in words[1:4]])
@@ -174,7 +175,7 @@ def _from_obj(path: FilePath) -> tuple[Array, NDArray[np.intp]]:
 
 def _from_stl(path: FilePath) -> tuple[Array, NDArray[np.intp]]:
     """Binary: 80 bytes, a count, 50 bytes a triangle; text: lines ``vertex x y z``."""
-    data = path.read_bytes()
+    data = content_of(path, LARGEST_TABLE)
     count = int.from_bytes(data[80:84], "little")
     if len(data) == 84 + 50 * count:
         kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
