@@ -59,9 +59,9 @@ class Estimate:
     covariance: Array
 
 
-def predict(estimate: Estimate, robot: Robot, turned: Array) -> Estimate:
-    """Estimate after the wheels turned by ``turned`` (W,) rad (odometry)."""
-    step = robot.forward @ turned
+def predict(estimate: Estimate, robot: Robot, step: Array) -> Estimate:
+    """Estimate after a motion ``step`` (3,) (m, m, rad, in the body) that the wheels have measured
+    (odometry)."""
     yaw = estimate.pose[2] + step[2] / 2
     cos, sin = math.cos(yaw), math.sin(yaw)
     moved = np.array([cos * step[0] - sin * step[1], sin * step[0] + cos * step[1], step[2]])
@@ -127,7 +127,9 @@ class ApproachController:
         """Wheel speeds (W,) at ``t`` (s)."""
         wheels = measured.wheel_angles
         if self._last_wheels is not None:
-            self.estimate = predict(self.estimate, self.robot, wheels - self._last_wheels)
+            self.estimate = predict(
+                self.estimate, self.robot, self.robot.forward @ (wheels - self._last_wheels)
+            )
         self._last_wheels = wheels.copy()
         if measured.pose is not None:
             self.estimate = correct(self.estimate, measured.pose, measured.deviations)

@@ -23,6 +23,9 @@ from trajopt.timing.trajectory import Trajectory
 from trajopt.world.scene import Scene
 from trajopt.world.terrain import Flat
 
+FASTER = 1.2  # than the fastest planned wheel, times: what feedback may ask of wheels; chosen
+SLIP_TIME = 0.05  # s over which slip is averaged: contacts of rollers chatter; chosen
+
 
 @dataclass(frozen=True, eq=False)
 class ValidationReport:
@@ -68,6 +71,16 @@ class ValidationReport:
         """(A,): largest difference, rad, between each wheel's steering or castor angle and the
         plan's."""
         return np.asarray(np.abs(self.steering - self.wheel_plan.steering).max(axis=0))
+
+    @property
+    def slip_share(self) -> float:
+        """Largest mean slip of a wheel over ``SLIP_TIME``, over the plan's largest speed."""
+        t, places = self.recording.times, self.planned[:, :2]
+        top = float((np.hypot(*np.diff(places, axis=0).T) / np.diff(t)).max())
+        count = max(round(SLIP_TIME / float(t[1] - t[0])), 1)
+        total = np.cumsum(np.vstack([np.zeros(len(self.wheels)), self.recording.slip]), axis=0)
+        mean = (total[count:] - total[:-count]) / count
+        return float(mean.max()) / top
 
     @property
     def spin_error(self) -> Array:
@@ -162,10 +175,15 @@ class _Followed:
 def _followed(
     trajectory: Trajectory, robot: Robot, mode: Mode, critical: tuple[int, ...]
 ) -> _Followed:
-    if mode == "pose" and not robot.holonomic:
-        tracking = TrackingController(trajectory, Tracker(), robot)
-        return _Followed(tracking, tracking.times, tracking.times, tracking.tracker.settle)
-    if mode == "pose and phase" and not robot.holonomic:
+    steers = any(wheel.kind in ("steered", "castor") for wheel in robot.rolling)
+    if mode == "pose" and (steers or not robot.holonomic):
+        rims = trajectory.at(trajectory.times).wheel_speeds * [w.radius for w in robot.wheels]
+        tracker = Tracker(wheel_speed=FASTER * float(np.abs(rims).max()))
+        tracking = TrackingController(trajectory, tracker, robot)
+        return _Followed(tracking, tracking.times, tracking.times, tracker.settle)
+    if mode == "wheel servo" and steers:
+        raise ArgumentError("control", mode, f"pose: '{robot.name}' also steers")
+    if mode == "pose and phase" and (steers or not robot.holonomic):
         raise ArgumentError("control", mode, "wheel servo or pose for a robot that has to turn")
     if mode == "pose and phase" and not critical:
         raise ArgumentError("critical", critical, "the wheels whose final angles count")

@@ -91,8 +91,9 @@ class PyBullet:
             bullet.setPhysicsEngineParameter(
                 fixedTimeStep=self.step,
                 numSolverIterations=self.solver_iterations,
-                # the implicit cone makes rollers creep
-                enableConeFriction=int(not model.is_roller.any()),
+                # Bullet's cone lets the wheel of an axle that comes first hold all it can across,
+                # and then spin (measured: PowerBot along a slope turned by 40 deg): see _grip
+                enableConeFriction=0,
                 contactBreakingThreshold=self.contact_breaking_threshold,
                 erp=self.contact_erp,
                 contactERP=self.contact_erp,
@@ -162,12 +163,20 @@ class _Session:
             # small angles keep their digits: whole turns are added when reading
             bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
             self.offset[link] = float(angle - fold(float(angle)))
-        # rollers of each wheel that has any, and the axis of its lowest, which holds it
-        by_wheel = [np.flatnonzero(model.is_roller & (model.parents == f)) for f in model.feet]
-        self.rollers = [found.tolist() for found in by_wheel if len(found)]
-        lowest = [min(found, key=lambda i: model.frames[i][0][2]) for found in self.rollers]
+        # links of each wheel that touch the ground; of those with rollers the lowest one's axis
+        found = [np.flatnonzero(model.is_roller & (model.parents == foot)) for foot in model.feet]
+        self.rolling = [k for k, rollers in enumerate(found) if len(rollers)]
+        self.gripping = [
+            rollers.tolist() if len(rollers) else [foot]
+            for rollers, foot in zip(found, model.feet, strict=True)
+        ]
+        lowest = [min(found[k], key=lambda i: model.frames[i][0][2]) for k in self.rolling]
         self.axes = np.array([model.frames[i][1][:, 2] for i in lowest]).reshape(-1, 3)
-        self.grips = np.ones(len(self.axes))
+        self.tyre_of = {
+            self.joint[links[0]]: k
+            for k, links in enumerate(self.gripping) if k not in self.rolling
+        }  # fmt: skip
+        self.grips = np.ones(len(model.feet))
         self.turns = np.array([self.offset[link] for link in model.targets])
         self.before: Array | None = None
         links = model.links
@@ -242,8 +251,7 @@ class _Session:
                 robot, self.steered, bullet.POSITION_CONTROL, targetPositions=self.before.tolist(),
                 targetVelocities=rates.tolist(), forces=self.powers,
             )  # fmt: skip
-        if len(self.axes):
-            self._grip()
+        self._grip()
         if self.forced:
             self.rests[self.commanded] = angles[count:]
             now, speeds, _ = self.joints(tuple(self.forced))
@@ -255,20 +263,29 @@ class _Session:
         bullet.stepSimulation()
 
     def _grip(self) -> None:
-        """Friction of rollers along their axes, set anew where the robot has turned.
+        """Friction of all wheels, set anew where what they hold has turned.
 
-        Bullet's two directions of friction, of which the first has no x, are both laid along a
-        roller's axis, each as long as its share: together they hold |c1| + |c2| times what one
-        does.
+        Bullet bounds two directions of friction, of which the first has no x, each by itself. A
+        tyre that pulls between them would hold too well: it gets the friction at which the bounds'
+        corner holds what it should. Rollers have both directions laid along their axes, each as
+        long as its share: together they hold |c1| + |c2| times what one does.
         """
-        _, attitude = self.bullet.getBasePositionAndOrientation(self.robot)
-        turn = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
-        first = np.array([0.0, -turn[2, 2], turn[1, 2]]) / math.hypot(turn[1, 2], turn[2, 2])
-        share = np.abs(self.axes @ turn.T @ first)
-        wanted = 1.0 / (share + np.sqrt(np.maximum(1.0 - share**2, 0.0)))
+        wanted = self.grips.copy()
+        if len(self.axes):
+            _, attitude = self.bullet.getBasePositionAndOrientation(self.robot)
+            turn = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
+            first = np.array([0.0, -turn[2, 2], turn[1, 2]]) / math.hypot(turn[1, 2], turn[2, 2])
+            share = np.abs(self.axes @ turn.T @ first)
+            wanted[self.rolling] = 1.0 / (share + np.sqrt(np.maximum(1.0 - share**2, 0.0)))
+        if len(self.axes) < len(wanted):
+            for p in self.bullet.getContactPoints(bodyA=self.robot):
+                wheel = self.tyre_of.get(p[3], -1)
+                force = math.hypot(p[10], p[12])
+                if wheel >= 0 and force > 0.0:
+                    wanted[wheel] = max(abs(p[10]), abs(p[12])) / force
         for k in np.flatnonzero(np.abs(wanted - self.grips) > GRIP_ERROR * wanted):
             self.grips[k] = wanted[k]
-            for i in self.rollers[k]:
+            for i in self.gripping[k]:
                 grip = float(wanted[k]) * self.model.links[i].grip * self.stage.scene.friction
                 self.bullet.changeDynamics(self.robot, self.joint[i], lateralFriction=grip)
 

@@ -1,0 +1,212 @@
+"""Robots of five kinds on slopes and rough ground, in both physics engines, beside their plans.
+
+Run from the repository: ``python -m benchmarks.ground_physics``. Prints three tables: motions
+planned with 80 % of the friction, open and closed loop; motions planned with 120 % of it; and the
+slopes at which robots tip over. ``--robots``, ``--engines``, ``--frictions`` leave some out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from benchmarks.common import ResultTable, publish
+from trajopt.errors import SimulationError
+from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
+from trajopt.limits.tip import Tip, support_edges
+from trajopt.paths.path import Path
+from trajopt.robots import Robot, robot
+from trajopt.robots.robot import STANDARD_GRAVITY
+from trajopt.simulate.check import ValidationReport, validate
+from trajopt.simulate.engine import ENGINES, make_engine
+from trajopt.simulate.stepping import open_session
+from trajopt.timing.scaling import time_scale
+from trajopt.timing.trajectory import Trajectory
+from trajopt.world.ground import Ground
+from trajopt.world.plane import Plane
+from trajopt.world.rough import rough_ground
+from trajopt.world.scene import Scene
+
+# Robots and the tangent of the slopes they drive on, over the friction; PowerBot's drive wheels
+# alone hold it across and carry 5/8 of it.
+ROBOTS = {"powerbot": 0.17, "loc8": 0.3, "asoc-4": 0.3, "car": 0.3, "swerve": 0.3}
+GROUNDS = ("contour", "diagonal", "rough")
+FRICTIONS = (0.4, 0.6, 0.8)
+SPEED, LENGTH, BEND = 1.0, 2.0, 0.08  # m/s, m, m: a slight S in two metres
+SAFE, BEYOND = 0.8, 1.2  # shares of the friction
+# Tall robots: centres of gravity raised until they tip before they slide. Springs are made stiff, for
+# on soft ones a robot leans by its sag before it tips, and axles rigid, for one that tilts carries
+# at its middle: the limit knows neither.
+TALL: dict[str, dict[str, Any]] = {
+    "powerbot": {"body.cog": [-0.132, 0.0, 0.7]},
+    "loc8": {"body.cog": [0.0, 0.0, 0.7]},
+    "asoc-4": {
+        "body.cog": [0.0, 0.0, 0.9],
+        "pivots.all.sag": 0.001,
+        "pivots.all.tilt": "rigid",
+        "motors.all.torque": 200.0,  # one module has to hold it all
+    },
+    "car": {"body.cog": [0.17145, 0.0, 0.3]},
+    "swerve": {"body.cog": [0.0, 0.0, 0.6]},
+}
+TIPS = {"downhill": 0.0, "across": math.pi / 2}
+FIRM = 2.0  # friction at which none slides
+FALL, LEAN = 2.5, math.radians(5.0)  # s in which a robot leans by that much when it tips over
+WITHIN, RESOLUTION = math.radians(4.0), math.radians(0.3)
+
+Rows = Iterator[tuple[str, ...]]
+
+
+def ground_of(name: str, place: str, friction: float) -> Ground:
+    """A slope that rises along y, or hills of 3 cm."""
+    if place == "rough":
+        rng = np.random.default_rng(4)
+        return rough_ground(0.03, rng=rng, size=8.0, correlation=0.8, spacing=0.1)
+    return Plane(math.atan(ROBOTS[name] * friction), math.pi / 2)
+
+
+def plan(name: str, place: str, friction: float, share: float) -> Trajectory:
+    """A slight bend along the contour or, on the other grounds, between it and uphill; robots that
+    can keep their heading."""
+    machine, turn = robot(name), 0.0 if place == "contour" else math.pi / 4
+    points = np.array([[0.0, 0.0], [LENGTH / 2, BEND], [LENGTH, 0.0]])
+    cos, sin = math.cos(turn), math.sin(turn)
+    keeps = machine.drivable.shape[1] == 3
+    path = Path.through(
+        points @ np.array([[cos, sin], [-sin, cos]]), heading=[0.0, 0.0, 0.0] if keeps else None
+    )
+    limits = (Speed(SPEED), Slip(share * friction, per_wheel=True), Tip())
+    return time_scale(path, limits, robot=machine, ground=ground_of(name, place, friction))
+
+
+def driven(
+    trajectory: Trajectory, friction: float, engine: str, *, closed: bool = False
+) -> ValidationReport:
+    scene = Scene(friction, trajectory.ground)
+    return validate(trajectory, scene, engine=engine, control="pose" if closed else None, seed=1)
+
+
+def tip_slope(machine: Robot, direction: float) -> float:
+    """Slope (rad) at which the model has the robot, at rest on a plane that falls along
+    ``direction`` in the body, tip over."""
+    arms = np.array(machine.body.contacts) - np.array(machine.body.cog[:2])
+    normals, distances = support_edges(arms)
+    towards = normals @ np.array([math.cos(direction), math.sin(direction)])
+    over = towards > 1e-9
+    reach = distances[over] / towards[over]
+    return math.atan(float(reach.min()) / machine.body.cog[2])
+
+
+def tipped(machine: Robot, direction: float, slope: float, engine: str) -> bool:
+    """Whether the robot, its wheels held, tips over on a plane of ``slope`` (rad) that falls along
+    ``direction`` (rad) in its body."""
+    plane = Plane(slope, direction + math.pi)
+    chosen = make_engine(engine)
+    with open_session(machine, Scene(FIRM, plane), chosen) as session:
+        still = np.zeros(len(machine.wheels)), np.zeros(len(session.model.targets))
+        for _ in range(round(FALL / chosen.step / 50)):
+            for _ in range(50):
+                session.advance(*still)
+            if session.base().rotation[0][:, 2] @ plane.normal < math.cos(LEAN):
+                return True
+    return False
+
+
+def physics_tip_slope(machine: Robot, direction: float, engine: str) -> float:
+    """Slope (rad) at which it does, within WITHIN of the model's, to RESOLUTION."""
+    expected = tip_slope(machine, direction)
+    low, high = expected - WITHIN, expected + WITHIN
+    while high - low > RESOLUTION:
+        middle = (low + high) / 2
+        low, high = (low, middle) if tipped(machine, direction, middle, engine) else (middle, high)
+    return (low + high) / 2
+
+
+def safe_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[float]) -> Rows:
+    """Motions planned with SAFE of the friction."""
+    for name, place, friction in product(names, GROUNDS, frictions):
+        trajectory = plan(name, place, friction, SAFE)
+        for engine in engines:
+            opened = driven(trajectory, friction, engine)
+            closed = driven(trajectory, friction, engine, closed=True)
+            moving = opened.recording.times < trajectory.duration
+            off = np.abs(opened.recording.loads - opened.wheel_plan.loads)[moving].mean(axis=0)
+            weight = trajectory.robot.body.mass * STANDARD_GRAVITY
+            yield (
+                name, place, f"{friction:g}", engine, f"{trajectory.duration:.2f}",
+                f"{100 * opened.final_distance / opened.length:.2f}",
+                f"{1e3 * closed.final_distance:.1f}", f"{100 * opened.slip_share:.1f}",
+                f"{100 * closed.slip_share:.1f}", f"{opened.steering_error.max():.4f}",
+                f"{100 * off.max() / weight:.1f}",
+            )  # fmt: skip
+
+
+def beyond_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[float]) -> Rows:
+    """Motions planned with BEYOND of the friction."""
+    for name, place, friction in product(names, GROUNDS, frictions):
+        trajectory = plan(name, place, friction, BEYOND)
+        for engine in engines:
+            share, off = "left physics", ""
+            try:
+                report = driven(trajectory, friction, engine)
+                share = f"{100 * report.slip_share:.1f}"
+                off = f"{100 * report.final_distance / report.length:.2f}"
+            except SimulationError as error:
+                off = str(error)
+            yield name, place, f"{friction:g}", engine, share, off
+
+
+def tip_rows(names: Sequence[str], engines: Sequence[str]) -> Rows:
+    """Tall robots, downhill and across."""
+    for name, (word, direction) in product(names, TIPS.items()):
+        machine = robot(name, TALL[name])
+        expected = math.degrees(tip_slope(machine, direction))
+        found = [math.degrees(physics_tip_slope(machine, direction, e)) for e in engines]
+        yield (
+            name,
+            f"{TALL[name]['body.cog'][2]:g}",
+            word,
+            f"{expected:.1f}",
+            *(f"{v:.1f}" for v in found),
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", nargs="+", default=list(ROBOTS), choices=list(ROBOTS))
+    parser.add_argument("--engines", nargs="+", default=list(ENGINES), choices=list(ENGINES))
+    parser.add_argument("--frictions", nargs="+", type=float, default=list(FRICTIONS))
+    asked = parser.parse_args()
+    cases = (asked.robots, asked.engines, asked.frictions)
+    motion = ("robot", "ground", "friction", "engine")
+    tables = [
+        ResultTable(
+            f"Planned with {SAFE:.0%} of the friction",
+            (*motion, "duration [s]", "open loop: off [% of way]", "closed loop: off [mm]",
+             "slip, open [% of speed]", "slip, closed [%]", "steering off [rad]",
+             "loads off [% of weight]"),
+            list(safe_rows(*cases)),
+        ),
+        ResultTable(
+            f"Planned with {BEYOND:.0%} of the friction",
+            (*motion, "slip [% of speed]", "off [% of way]"),
+            list(beyond_rows(*cases)),
+        ),
+        ResultTable(
+            "Slope at which a tall robot tips over",
+            ("robot", "centre of gravity [m]", "facing", "model [deg]",
+             *(f"{e} [deg]" for e in asked.engines)),
+            list(tip_rows(asked.robots, asked.engines)),
+        ),
+    ]  # fmt: skip
+    publish("ground_physics", tables, packages=("trajopt", "numpy", *ENGINES))
+
+
+if __name__ == "__main__":
+    main()
