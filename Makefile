@@ -14,7 +14,7 @@ $(READY): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV): a few minutes on a fresh machine."
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[simulate,speed,sweep,optimizers,dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[simulate,speed,sweep,optimizers,video,dev]'
 	touch $@
 
 demo: $(READY)  ## solve Table 5.3 and Scenario 1 forward35 (P1 and P2 free: it keeps clear of the step), check both in pybullet, write out/demo/
@@ -22,7 +22,7 @@ demo: $(READY)  ## solve Table 5.3 and Scenario 1 forward35 (P1 and P2 free: it 
 	$(BIN)/trajopt validate out/demo/table_5_3 --engine pybullet
 	$(BIN)/trajopt solve problems/smdw/scenario_1_forward35.toml --set 'spline.free=["p1","p2"]' --out out/demo/scenario_1_forward35
 	$(BIN)/trajopt validate out/demo/scenario_1_forward35 --engine pybullet
-	@echo "Open out/demo/: pictures, trajectory.csv and summary.json of both runs."
+	@echo "Open out/demo/: view.html shows each run in the browser."
 
 test: $(READY)  ## the tests (under 8 minutes on two cores)
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

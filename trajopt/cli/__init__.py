@@ -8,7 +8,7 @@ import sys
 
 import typer
 
-from trajopt.cli import bench, paths, robot, search, sweep
+from trajopt.cli import bench, paths, robot, search, sweep, view
 from trajopt.cli.shared import leaving
 from trajopt.errors import TrajoptError
 from trajopt.report.words import PlainConsole
@@ -31,6 +31,7 @@ for command in (
     search.schema,
     robot.robot,
     sweep.report,
+    view.view,
 ):
     app.command()(command)
 app.add_typer(bench.app, name="bench")

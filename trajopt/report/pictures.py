@@ -45,11 +45,15 @@ def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath,
 def save_physics_picture(
     solution: Solution, report: ValidationReport, folder: str | FilePath
 ) -> tuple[FilePath, ...]:
-    """Draw physics.png and, where the engine made a picture, engine.png. Returns the files.
+    """Draw physics.png and, where the engine made a picture, engine.png, and write view.html anew.
+    Returns the pictures.
 
     Raises ArgumentError for a solution without a trajectory or a folder that cannot be written.
     """
+    from trajopt.report.viewer.motion_page import write_view
+
     place = made_folder(folder)
+    write_view(solution, place)
     with in_style():
         files = [save_figure(physics_figure(solution, report), place / "physics.png")]
     if report.recording.picture is not None:

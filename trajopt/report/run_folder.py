@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
 
 FORMAT = 3  # of the folder; a reader of another number refuses
-_OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png")
+_OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png", "view.html")
 _OF_A_SOLUTION = (
     "summary.json",
     "problem.toml",
@@ -113,8 +113,10 @@ def write_solution(
         solution.details.save(place, pictures=pictures)
     if pictures:
         from trajopt.report.pictures import save_pictures
+        from trajopt.report.viewer.motion_page import write_view
 
         save_pictures(solution, place)
+        write_view(solution, place)
     summary = solution_summary(solution, seed=seed)
     summary["run"] = {
         **run_facts(),

@@ -18,6 +18,7 @@ from trajopt.errors import ArgumentError
 from trajopt.robots.description import PivotSection, WheelSection
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 from trajopt.simulate.double import double_rollers
+from trajopt.simulate.looks import axle, mounts
 from trajopt.simulate.model import (
     Joint,
     Link,
@@ -209,7 +210,8 @@ class _Parts:
                 damping=moved / TILT_TIME, reach=(-pivot.tilt_range, pivot.tilt_range),
             )
         )  # fmt: skip
-        return Link(f"axle {pivot.name}", parent, joint, mass, (across, about, across))
+        looks = axle(wheels[0].radius, half, wheels[0].trail)
+        return Link(f"axle {pivot.name}", parent, joint, mass, (across, about, across), looks=looks)
 
 
 def _chassis(robot: Robot, others: list[Link]) -> Link:
@@ -235,7 +237,7 @@ def _chassis(robot: Robot, others: list[Link]) -> Link:
     return Link(
         "chassis", -1, Joint("fixed", Pose()), rest, _scaled(box, own / box[2]),
         (float(cog[0]), float(cog[1]), float(cog[2])),
-        shapes=(shape,), looks=(shape,), colour=CHASSIS_COLOUR,
+        shapes=(shape,), looks=(shape, *mounts(robot.description)), colour=CHASSIS_COLOUR,
     )  # fmt: skip
 
 

@@ -24,6 +24,7 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.robots.description import RollerSection, WheelSection
+from trajopt.simulate.looks import plate
 from trajopt.simulate.model import Joint, Link, Pose, Shape, Vector, cylinder, sphere
 
 Support = Callable[[Array], Array]
@@ -263,10 +264,10 @@ def roller_wheel(
             "rollers.mass", section.mass, f"{len(rollers)} rollers that weigh less than the wheel"
         )
     about, across = disc_inertia(hub_mass, 0.8 * wheel.radius, wheel.width)
-    drum = cylinder(0.35 * wheel.radius, 0.8 * wheel.width, Pose.along((0.0, 1.0, 0.0)))
+    inner = min(math.hypot(roller.centre[0], roller.centre[2]) for roller in rollers)
     links = [
         Link(
-            wheel.name, parent, spin, hub_mass, (across, about, across), looks=(drum,),
+            wheel.name, parent, spin, hub_mass, (across, about, across), looks=plate(inner, wheel.width),
             colour=HUB_COLOUR,
         )
     ]  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from trajopt.robots.description import WheelSection
+from trajopt.simulate import looks
 from trajopt.simulate.model import Joint, Link, Pose, Shape, cylinder, sphere
 from trajopt.simulate.rollers import disc_inertia
 
@@ -50,7 +51,10 @@ def fork(wheel: WheelSection, joint: Joint, parent: int) -> Link:
     mass = FORK_SHARE * wheel.mass
     about, across = disc_inertia(mass, wheel.radius, wheel.width)
     cog = (-wheel.trail, wheel.lateral, 0.0)
-    return Link(f"{wheel.name}/fork", parent, joint, mass, (across, about, across), cog)
+    return Link(
+        f"{wheel.name}/fork", parent, joint, mass, (across, about, across), cog,
+        looks=looks.fork(wheel),
+    )  # fmt: skip
 
 
 def _spoke(wheel: WheelSection) -> Shape:

@@ -1,0 +1,46 @@
+"""``trajopt view``: a run in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from trajopt.cli.shared import console
+from trajopt.errors import ArgumentError
+
+
+def view(
+    folder: Annotated[
+        Path, typer.Argument(help="folder written by solve --out", show_default=False)
+    ],
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="open the page")] = True,
+    gif: Annotated[Path | None, typer.Option("--gif", help="record it into this file")] = None,
+    mp4: Annotated[Path | None, typer.Option("--mp4", help="record it into this file")] = None,
+    camera: Annotated[
+        str, typer.Option(help="of a recording: whole, above, side, chase, wheel")
+    ] = "whole",
+    speed: Annotated[float, typer.Option(help="of a recording, over the motion's own")] = 1.0,
+    size: Annotated[tuple[int, int], typer.Option(help="of a recording, pixels")] = (640, 400),
+) -> None:
+    """Write view.html, a page that shows the run without network or server, and open or record it."""
+    import webbrowser
+
+    from trajopt.report.run_folder import read_solution
+    from trajopt.report.viewer.motion_page import write_view
+    from trajopt.report.viewer.record import record
+
+    solution = read_solution(folder)
+    page = write_view(solution, folder)
+    if page is None:
+        raise ArgumentError("folder", str(folder), "a run with a motion; " + solution.status)
+    console.print(f"written to {page}", highlight=False, soft_wrap=True)
+    for file, kind in ((gif, ".gif"), (mp4, ".mp4")):
+        if file is not None:
+            if file.suffix.lower() != kind:
+                raise ArgumentError(f"--{kind[1:]}", str(file), f"a name that ends in {kind}")
+            record(page, file, size=size, camera=camera, speed=speed)
+            console.print(f"written to {file}", highlight=False, soft_wrap=True)
+    if open_ and gif is None and mp4 is None:
+        webbrowser.open(page.resolve().as_uri())

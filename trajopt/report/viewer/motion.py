@@ -1,0 +1,130 @@
+"""Motions as the page plays them: poses and joint angles of every link at sampled times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from trajopt.arrays import Array, rotation
+from trajopt.report.motion import column
+from trajopt.report.viewer.pages import packed
+from trajopt.report.viewer.robot_data import wheel_of_joint
+from trajopt.report.viewer.rollers import rim_velocity, rollers_data, sliding_velocity
+from trajopt.robots.robot import Robot
+from trajopt.simulate.build import build
+from trajopt.timing.trajectory import Trajectory
+
+STEP = 0.01  # s between samples, chosen: a wheel that accelerates by 80 rad/s^2 is 1e-3 rad off between them
+MOST = 1500  # samples of a motion; longer ones are thinned, chosen
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """``times`` (N,) s, ``place`` (N, 3) m and ``rotation`` (N, 3, 3) of the robot's frame, ``twist`` (N, 3) in it,
+    angles and rates (N, K) of all wheels of the robot's file, rad; ``loads`` N and ``slip`` m/s (N, K) where known."""
+
+    name: str
+    times: Array
+    place: Array
+    rotation: Array
+    twist: Array
+    spin: Array
+    spin_rate: Array
+    steering: Array
+    steering_rate: Array
+    loads: Array | None = None
+    slip: Array | None = None
+
+
+def planned(trajectory: Trajectory, name: str = "planned") -> Motion:
+    """A trajectory in equal steps."""
+    count = min(MOST, max(2, int(np.ceil(trajectory.duration / STEP)) + 1))
+    times = np.linspace(0.0, trajectory.duration, count)
+    state = trajectory.at(times)
+    return Motion(
+        name, times, state.position, state.rotation, state.twist, state.spin_angles,
+        state.spin_rates, state.steering_angles, state.steering_rates,
+    )  # fmt: skip
+
+
+def simulated(table: Mapping[str, Array], robot: Robot, name: str) -> Motion:
+    """What ``simulated.csv`` holds, thinned where it is long."""
+    count = len(table["t_s"])
+    kept = np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int))
+    table = {key: values[kept] for key, values in table.items()}
+    times = table["t_s"]
+    none = np.zeros(len(times))
+    yaw, pitch, roll = (table.get(f"{k}_rad", none) for k in ("yaw", "pitch", "roll"))
+    place = np.column_stack([table["x_m"], table["y_m"], table.get("z_m", none)])
+    velocity = np.gradient(place[:, :2], times, axis=0)
+    ahead = np.einsum("nij,ni->nj", rotation(yaw), velocity)
+    twist = np.column_stack([ahead, np.gradient(yaw, times)])
+    wheels = robot.description.wheels
+    steering = np.column_stack([table.get(column(w.name, "steering_rad"), none) for w in wheels])
+    steering_rate = np.asarray(np.gradient(steering, times, axis=0))
+    spin_rate = rim_velocity(robot, twist, steering, steering_rate, None)[1]
+    for k, wheel in enumerate(wheels):
+        spin_rate[:, k] = table.get(column(wheel.name, "speed_rad_s"), spin_rate[:, k])
+    spin = np.vstack([np.zeros(len(wheels)), np.cumsum(
+        (spin_rate[1:] + spin_rate[:-1]) / 2 * np.diff(times)[:, None], axis=0)])  # fmt: skip
+    for k, wheel in enumerate(wheels):
+        spin[:, k] = table.get(column(wheel.name, "angle_rad"), spin[:, k])
+    loads, slip = (_every_wheel(table, robot, unit) for unit in ("load_n", "slip_m_s"))
+    return Motion(
+        name, times, place, _attitude(roll, pitch, yaw), twist, spin, spin_rate, steering,
+        steering_rate, loads, slip,
+    )  # fmt: skip
+
+
+def motion_data(motion: Motion, robot: Robot) -> dict[str, Any]:
+    """A motion for the page: the robot's frame, every joint that turns, rollers, and forces as arrows."""
+    model = build(robot, outline=False)
+    joints = {}
+    for link, wheel in wheel_of_joint(model).items():
+        of_spin = model.links[link].joint.role == "spin"
+        values = (motion.spin if of_spin else motion.steering)[:, wheel]
+        if np.any(values):
+            joints[str(link)] = packed(values)
+    found: dict[str, Any] = {
+        "name": motion.name,
+        "times": packed(motion.times),
+        "base": packed(np.column_stack([motion.place, _quaternions(motion.rotation)])),
+        "joints": joints,
+        "rollers": rollers_data(motion, robot, model),
+    }
+    if motion.loads is not None:
+        found["loads"] = packed(motion.loads)
+    if motion.slip is not None:
+        sliding = sliding_velocity(motion, robot, model)
+        speed = np.maximum(np.linalg.norm(sliding, axis=2, keepdims=True), 1e-9)
+        found["slip"] = packed(sliding / speed * motion.slip[:, :, None])
+    return found
+
+
+def _every_wheel(table: Mapping[str, Array], robot: Robot, unit: str) -> Array | None:
+    keys = [column(wheel.name, unit) for wheel in robot.description.wheels]
+    return np.column_stack([table[key] for key in keys]) if all(k in table for k in keys) else None
+
+
+def _attitude(roll: Array, pitch: Array, yaw: Array) -> Array:
+    """(N, 3, 3): turned by roll about x, then by pitch about y, then by yaw about z."""
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(a), np.sin(a)) for a in (roll, pitch, yaw))
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _quaternions(turns: Array) -> Array:
+    """(N, 4): x, y, z, w of rotation matrices, without jumps of sign."""
+    from scipy.spatial.transform import Rotation
+
+    found = Rotation.from_matrix(turns).as_quat()
+    flips = np.sign(np.sum(found[1:] * found[:-1], axis=1))
+    found[1:] *= np.cumprod(np.where(flips < 0, -1.0, 1.0))[:, None]
+    return np.asarray(found)
