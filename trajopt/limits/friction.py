@@ -68,7 +68,7 @@ Friction = float | tuple[float, ...] | FrictionAlong | FrictionMap
 def require_friction(argument: str, friction: Friction) -> None:
     """Raises ArgumentError unless it is a coefficient > 0, several, or one of the classes here."""
     if not isinstance(friction, (FrictionAlong, FrictionMap)):
-        shape = () if np.ndim(friction) == 0 else (None,)
+        shape = (None,) if hasattr(friction, "__len__") else ()
         require_positive(argument, friction, "(friction coefficient)", shape)
 
 
