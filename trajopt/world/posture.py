@@ -82,8 +82,8 @@ def frame_on(
     if ground.level:
         return _along(x.cut(order), y.cut(order), surface, own, pace.sqrt())
     if contacts is not None and ground.bends:
-        heading = own if own is not None else _direction(x, y)
-        z, slope_x, slope_y = _plane_under(ground, path, u, (x, y), heading, contacts)
+        ahead_of = own if own is not None else _direction(x, y)
+        z, slope_x, slope_y = _plane_under(ground, path, u, (x, y), ahead_of, contacts)
     else:
         z = surface
         slope_x = compose(ground, *at, 1, 0, order - 1)
