@@ -189,5 +189,7 @@ def test_explain_says_that_a_slow_steering_costs_time():
     assert seconds[0] > seconds[1] + 1e-3
     bound = [line for line in slow.stdout.splitlines() if line.rstrip().endswith("steering_rate")]
     assert bound, slow.stdout
-    assert not [line for line in fast.stdout.splitlines() if line.rstrip().endswith("steering_rate")]
+    assert not [
+        line for line in fast.stdout.splitlines() if line.rstrip().endswith("steering_rate")
+    ]
     assert "steering rate, front-" in slow.stdout
