@@ -13,7 +13,7 @@ from PIL import Image
 
 from trajopt import Path as RobotPath
 from trajopt import Slip, Speed, robot, solve, time_scale
-from trajopt.errors import ProblemError
+from trajopt.errors import ProblemError, TrajoptError
 from trajopt.limits.friction import FrictionAlong, FrictionMap
 from trajopt.limits.speed_bound import SpeedZones
 from trajopt.problem import Problem, load_problem
@@ -224,6 +224,13 @@ def test_a_run_folder_on_a_map_stands_alone(folder: Path, tmp_path: Path) -> Non
     )
     again = write_solution(solve(load_problem(out / "problem.toml")), out, seed=0)
     np.testing.assert_array_equal(np.load(again / "height_map.npy"), HEIGHTS)
+    other = {**MAP, "file": "grey.png", "relief": 0.255}
+    write_solution(solve(problem_in(folder, **ground(height_map=other, grade=0.5))), out, seed=0)
+    assert {file.name for file in out.glob("height_map.*")} == {"height_map.png"}
+    assert read_solution(out).holds
+    (out / "height_map.png").write_bytes((folder / "metres.tif").read_bytes())
+    with pytest.raises(TrajoptError, match=r"height_map\.png"):
+        read_solution(out)
 
 
 def test_a_path_that_leaves_its_map_does_not_hold(folder: Path) -> None:

@@ -21,6 +21,7 @@ from trajopt.world.ramp import Edge, Ramp, Ramps
 from trajopt.world.rough import rough_ground
 from trajopt.world.terrain import Flat
 
+FILES = ("height_map", "mesh", "friction_map")  # tables that name a file
 SHAPES = ("plane", "ramps", "height_map", "mesh", "rough")
 Grade = Annotated[float, Field(gt=0, lt=1.57)]
 Origin = Field((0.0, 0.0), description="x, y of the lower left grid point, m")
@@ -184,7 +185,7 @@ class GroundSection(Section):
     @property
     def files(self) -> dict[str, str]:
         """Files that the section names, by the key of their table."""
-        found = {name: getattr(self, name) for name in ("height_map", "mesh", "friction_map")}
+        found = {name: getattr(self, name) for name in FILES}
         return {name: section.file for name, section in found.items() if section is not None}
 
     def shape(self, folder: FilePath) -> Ground:

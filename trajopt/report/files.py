@@ -11,6 +11,8 @@ from typing import Any
 from trajopt.errors import ArgumentError
 from trajopt.files import LARGEST_TABLE, content_of, seal, unseal, whole_file
 
+FORMAT = 3  # of run folders; a reader of another number refuses
+
 
 def write_text(file: FilePath, text: str) -> None:
     """As ``write_bytes``, in UTF-8."""

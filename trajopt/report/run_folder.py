@@ -23,8 +23,10 @@ from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
 from trajopt.pipeline import with_details
 from trajopt.problem import Problem, load_problem
+from trajopt.problem.ground import FILES
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import (
+    FORMAT,
     as_toml,
     made_folder,
     read_sealed,
@@ -49,7 +51,6 @@ if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
 
 
-FORMAT = 3  # of the folder; a reader of another number refuses
 _OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png", "view.html")
 _OF_A_SOLUTION = (
     "summary.json",
@@ -88,17 +89,16 @@ def write_solution(
     """
     place, search, problem = made_folder(folder), solution.search, solution.problem
     strange = [name for name in _OF_A_SOLUTION if (place / name).exists()]
+    strange += [path.name for key in FILES for path in place.glob(f"{key}.*")]
     if strange and "summary.json" not in strange:
         expected = f"a folder without {', '.join(strange)}: no run that ended wrote this"
         raise ArgumentError("folder", str(folder), expected)
     # Read first: the problem's file may stand in this folder itself.
     ground = {key: problem.folder / file for key, file in problem.ground.files.items()}
     stored = {key: (f"{key}{file.suffix}", file.read_bytes()) for key, file in ground.items()}
-    for name in (
-        *_OF_A_SOLUTION,
-        *_OF_A_CHECK,
-    ):  # nothing of an earlier run may pass for this one's
-        (place / name).unlink(missing_ok=True)
+    earlier = [path.name for key in FILES for path in place.glob(f"{key}.*")]
+    for name in (*_OF_A_SOLUTION, *_OF_A_CHECK, *earlier):
+        (place / name).unlink(missing_ok=True)  # nothing of an earlier run may pass for this one's
     for name, content in stored.values():
         write_bytes(place / name, content)
     names = {key: name for key, (name, _) in stored.items()}
@@ -126,7 +126,7 @@ def write_solution(
         "wall_time_s": solution.wall_time,
         "search_time_s": None if search is None else search.seconds,
         "files": checksums(
-            place, [n for n in (*_OF_A_SOLUTION, *names.values()) if n[-4:] != ".png"]
+            place, [*(n for n in _OF_A_SOLUTION if not n.endswith(".png")), *names.values()]
         ),
     }
     write_sealed(place / "summary.json", summary)

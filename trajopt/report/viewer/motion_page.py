@@ -12,7 +12,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.report.files import read_json
+from trajopt.report.files import FORMAT, read_sealed
 from trajopt.report.motion import limit_use
 from trajopt.report.viewer.motion import Motion, motion_data, planned, simulated
 from trajopt.report.viewer.pages import packed, write_page
@@ -37,7 +37,7 @@ def write_view(solution: Solution, folder: FilePath) -> FilePath | None:
         return None
     motions, hits, about = [planned(trajectory)], [], f"{trajectory.duration:.2f} s planned"
     if (folder / "simulated.csv").exists():
-        facts = read_json(folder / "validation.json")
+        facts = read_sealed(folder / "validation.json", FORMAT)
         motions.append(
             simulated(
                 read_columns(folder / "simulated.csv"), robot, f"simulated ({facts['engine']})"
