@@ -244,9 +244,9 @@ def test_robots_whose_torques_are_not_known_are_refused():
     with pytest.raises(ArgumentError, match="curve"):
         MotorCurve().rows(samples, robot("powerbot"))
     for wrong in (0.0, -1.0, (1.0, -2.0)):
-        with pytest.raises(ArgumentError, match="wheel_torque.largest"):
+        with pytest.raises(ArgumentError, match=r"wheel_torque\.largest"):
             WheelTorque(wrong)
-    with pytest.raises(ArgumentError, match="power.largest"):
+    with pytest.raises(ArgumentError, match=r"power\.largest"):
         Power(0.0)
     with pytest.raises(ArgumentError, match="motor"):
         WheelTorque(1.0).rows(samples, robot("powerbot", {"motors": []}))
