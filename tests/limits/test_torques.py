@@ -145,7 +145,7 @@ def excess_of_curve(samples, one, sdd, sd2, *, braking=False):
 def test_rows_of_a_curve_are_exact_at_their_speed_and_stricter_elsewhere(curve, braking):
     one = robot("powerbot", {"motors.all.curve": CURVES[curve], "motors.all.braking": braking})
     rng = np.random.default_rng(5)
-    samples = at(driven_along(one), rng.uniform(0.2, 4.2, 400))
+    samples = at(driven_along(one, (0.2, 0.7)), rng.uniform(0.2, 4.2, 400))
     fastest = (CURVES[curve][-1][0] / np.abs(samples.wheels.spin[:, :2]).max(axis=1)) ** 2
     near = fastest * rng.uniform(1e-4, 1.0, 400)
     rows = MotorCurve().rows(replace(samples, sd2=near), one)
@@ -159,13 +159,17 @@ def test_rows_of_a_curve_are_exact_at_their_speed_and_stricter_elsewhere(curve, 
         assert np.all(used.max(axis=1) >= true - 1e-9)
 
 
-def test_rows_without_a_speed_hold_the_torque_at_rest():
-    one = robot("powerbot", DC)
+@pytest.mark.parametrize("curve", CURVES)
+def test_rows_without_a_speed_hold_the_torque_at_rest(curve):
+    one = robot("powerbot", {"motors.all.curve": CURVES[curve]})
     samples = at(driven_along(one), np.array([1.0, 2.0]))
     still = MotorCurve().rows(replace(samples, sd2=np.zeros(2)), one)
     rows = MotorCurve().rows(samples, one)
     np.testing.assert_allclose(rows.c, still.c, atol=1e-4)
-    np.testing.assert_allclose(rows.b, wheel_torques(samples, one).b, atol=1e-12)
+    each = len(pieces(CURVES[curve]))
+    np.testing.assert_allclose(
+        rows.b, np.repeat(wheel_torques(samples, one).b[:, :2], each, axis=1), atol=1e-12
+    )
 
 
 def test_rows_of_power_are_exact_at_their_speed_and_stricter_elsewhere():
