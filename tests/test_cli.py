@@ -40,9 +40,11 @@ def solved(tmp_path_factory):
 def test_solve_writes_tables_that_others_read(solved):
     summary = json.loads((solved / "summary.json").read_text())
     assert summary["holds"]
+    assert summary["energy_j"] > 0
     table = pd.read_csv(solved / "trajectory.csv")
     assert {"t_s", "x_m", "y_m", "yaw_rad"} <= set(table.columns)
     assert table["t_s"].iloc[-1] == pytest.approx(summary["duration_s"])
+    assert table["energy_j"].iloc[-1] == pytest.approx(summary["energy_j"])
 
 
 def test_nothing_but_the_table_when_piped(solved):
@@ -101,6 +103,22 @@ def test_explain_names_binding_limits(plan):
     done = trajopt("explain", plan)
     assert done.returncode == 0, done.stderr
     assert "acceleration" in done.stdout
+
+
+def test_explain_names_motors_and_power():
+    curve = "robot.motors.all.curve=[[0, 20], [10, 0]]"
+    plan = ("problems/powerbot/experiment_1.toml", "--set", "limits.power=60", "--set", curve)
+    done = trajopt("explain", *plan)
+    assert done.returncode == 0, done.stderr
+    binding = done.stdout.split("least margin")[0]
+    assert "power" in binding
+    assert all(name in done.stdout for name in ("wheel_torque", "motor_curve"))
+
+
+def test_robot_tells_the_slopes_it_climbs():
+    shown = trajopt("robot", "powerbot", "--set", "motors.all.torque=30").stdout
+    assert "18.5 deg by the torque of its motors, 11.3 deg by friction 0.4, 18.5 deg by" in shown
+    assert "not counted" in trajopt("robot", "powerbot", "--set", "motors=[]").stdout
 
 
 def test_export_ends_at_rest(tmp_path):

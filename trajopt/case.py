@@ -62,7 +62,7 @@ class CaseOptions:
 def run_case(case: Case, problem: Problem) -> dict[str, Any]:
     """Solve ``problem``, which has the case's values, and drive it where the case says so.
 
-    A row of plain values and arrays: cost, terms, margins, faults, deviations, duration (s),
+    A row of plain values and arrays: cost, terms, margins, faults, deviations, duration (s), energy (J),
     control points; ``driven.*`` and the driven pose over time, where it was driven.
     """
     solution, report = solve_case(case, problem)
@@ -80,6 +80,7 @@ def run_case(case: Case, problem: Problem) -> dict[str, Any]:
     }
     if solution.trajectory is not None:
         row["duration"] = solution.trajectory.duration
+        row["energy"] = solution.energy
     if report is not None:
         row["driven"] = {
             "along": report.along,

@@ -11,6 +11,7 @@ import numpy as np
 
 from trajopt.arrays import Array, fold
 from trajopt.errors import InfeasibleError
+from trajopt.limits.torques import knows_torques
 from trajopt.objectives.clearance import ClearObjective
 from trajopt.objectives.duration import DurationObjective
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective
@@ -89,6 +90,14 @@ class Solution:
     def duration(self) -> float:
         """s; NaN without a trajectory."""
         return float("nan") if self.trajectory is None else self.trajectory.duration
+
+    @cached_property
+    def energy(self) -> float:
+        """Work of the motors, J (``Trajectory.energy``); NaN without a trajectory, or where torques
+        are not known."""
+        if self.trajectory is None or not knows_torques(self.problem.robot):
+            return float("nan")
+        return self.trajectory.energy
 
     @property
     def evaluations(self) -> int:
@@ -207,7 +216,8 @@ class Solution:
 def search_objective(problem: Problem) -> SearchObjective:
     """What the control points of a problem are searched for; with obstacles, clear of them."""
     terminal = terminal_objective(problem)
-    duration = DurationObjective(terminal) if problem.objective.kind == "duration" else None
+    kind = problem.objective.kind
+    duration = None if kind == "terminal" else DurationObjective(terminal, kind)
     obstacles = problem.scene.obstacles
     if not obstacles:
         return terminal if duration is None else duration

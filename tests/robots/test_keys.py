@@ -13,15 +13,18 @@ from pydantic import BaseModel
 
 from trajopt.errors import ProblemError
 from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
 from trajopt.limits.steering_acceleration import SteeringAcceleration
 from trajopt.limits.steering_rate import SteeringRate
 from trajopt.limits.tip import Tip
+from trajopt.limits.wheel_torque import WheelTorque
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples, sample_path
 from trajopt.problem.limits import LimitsSection
 from trajopt.robots import Robot, robot
 from trajopt.robots.checks import findings
 from trajopt.robots.description import RobotDescription
+from trajopt.timing.scaling import time_scale
 from trajopt.timing.track import track
 
 EXEMPT = {"name", "about", "source"}  # title and comments of the whole robot; set by the loader
@@ -38,6 +41,7 @@ def _rows(limit: Slip | Tip, one: Robot) -> list[list[float]]:
 
 
 SLOW = {"steering.0.rate": 3.0, "steering.0.acceleration": 3.0}
+CURVED = {"motors.0.curve": [[0, 8], [9, 0]]}
 STEERING = (SteeringRate(), SteeringAcceleration())
 
 
@@ -52,11 +56,22 @@ def _steering_rows(limit: SteeringRate | SteeringAcceleration, one: Robot) -> li
     return [found.a.tolist(), found.c.tolist(), found.sd2_max.tolist()]
 
 
+def _torque_rows(one: Robot) -> list[Any]:
+    found = []
+    for limit in LimitsSection(speed=1.0).limits(one, 0.5)[1:]:
+        rows = limit.rows(_steered(one), one)
+        found += [rows.a.tolist(), rows.b.tolist(), (rows.c / rows.scale).tolist()]
+        found.append(rows.sd2_max.tolist())
+    return found
+
+
 OUTPUTS: dict[str, Callable[[Robot], Any]] = {
     "slip": lambda one: _rows(Slip(0.4), one),
     "tip": lambda one: _rows(Tip(), one),
     "motor limits": lambda one: LimitsSection(speed=1.0).limits(one, 0.5),
     "rates": lambda one: one.inverse.tolist(),
+    "torque": _torque_rows,
+    "energy": lambda one: time_scale(CURVE, [WheelTorque(), Speed(0.5)], robot=one).energy,
     "outline": lambda one: one.footprint,
     "yaw inertia": lambda one: one.body.yaw_inertia,
     "mass": lambda one: one.body.mass,
@@ -131,6 +146,10 @@ ROWS: dict[str, Row] = {
     "motors.wheels": Row("tricycle", "motors.0.wheels", (["front"], ["rear-left"]), "driven"),
     "motors.speed": Row("loc8", "motors.0.speed", (10.0, 12.0), "motor limits"),
     "motors.acceleration": Row("loc8", "motors.0.acceleration", (10.0, 12.0), "motor limits"),
+    "motors.curve": Row("loc8", "motors.0.curve", ([[0, 8], [9, 0]], [[0, 8], [8, 0]]), "torque"),
+    "motors.gear": Row("loc8", "motors.0.gear", (2.0, 3.0), "torque", CURVED),
+    "motors.braking": Row("loc8", "motors.0.braking", ("full", "curve"), "torque", CURVED),
+    "motors.regeneration": Row("loc8", "motors.all.regeneration", (None, 0.5), "energy"),
     "steering.name": Row("swerve", "steering.0.name", ("a", "rear-left"), refused="different"),
     "steering.wheels": Row(
         "swerve", "steering.0.wheels", (["front-left"], ["rear-left"]), refused="each once"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,8 @@ from trajopt.report.words import words
 
 if TYPE_CHECKING:
     from trajopt.robots import Robot
+
+_FRICTIONS = (0.4, 0.8)  # chosen: wet and dry floors
 
 
 def robot(
@@ -49,6 +52,8 @@ def robot(
         mark = ("fault: " if finding.fault else "", "red")
         console.print(words(mark, f"{finding.about}: {finding.text}"))
         faults |= finding.fault
+    for about, text in _slopes(found).items():
+        console.print(f"{about}: {text}", highlight=False, soft_wrap=True)
     if out is not None:
         from trajopt.report.robot_picture import save_robot_picture
 
@@ -84,6 +89,24 @@ def _describe(robot: Robot) -> None:
     ]
     for line in lines:
         console.print(line, soft_wrap=True)
+
+
+def _slopes(robot: Robot) -> dict[str, str]:
+    """The steepest slopes straight ahead, and what is not known of them."""
+    from trajopt.limits.gradeability import grade_by_friction, grade_by_torque
+    from trajopt.limits.torques import knows_torques
+
+    if not knows_torques(robot):
+        return {"torque": "not counted in time scaling: no motors, or wheels that slide to turn"}
+    try:
+        torque = f"{math.degrees(grade_by_torque(robot)):.1f} deg by the torque of its motors"
+        grip = [
+            f"{math.degrees(grade_by_friction(robot, mu)):.1f} deg by friction {mu}"
+            for mu in _FRICTIONS
+        ]
+    except ArgumentError as error:
+        return {"climbs": str(error)}
+    return {"climbs": ", ".join([torque, *grip])}
 
 
 def _wheels(robot: Robot) -> str:

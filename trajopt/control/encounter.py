@@ -8,7 +8,7 @@ accelerate.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -161,6 +161,7 @@ def course(
     s = np.linspace(0.0, trajectory.path.length, count)
     samples = trajectory.track.samples(s, trajectory.path.locate(s))
     square = np.interp(s, trajectory.s, trajectory.sd**2)
+    samples = replace(samples, sd2=square)
     rows = [
         limit.rows(samples, trajectory.robot)
         for limit in (trajectory.limits if limits is None else limits)

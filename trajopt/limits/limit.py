@@ -34,7 +34,11 @@ class Rows:
 
 
 class Limit(Protocol):
-    """A limit of a motion. ``name`` is unique among the limits used together."""
+    """A limit of a motion. ``name`` is unique among the limits used together.
+
+    One that is not linear in (s'', s'^2) has an attribute ``linear`` = False, and rows that are
+    exact at s'^2 = ``path.sd2`` and nowhere looser than the limit: see ``MotorCurve``.
+    """
 
     @property
     def name(self) -> str: ...
@@ -43,6 +47,11 @@ class Limit(Protocol):
         """Rows at the gridpoints of ``path``. Raises ArgumentError where the limit needs a
         robot."""
         ...
+
+
+def is_linear(limit: Limit) -> bool:
+    """Whether its rows are the same at every speed."""
+    return bool(getattr(limit, "linear", True))
 
 
 def linear_rows(name: str, a: Array, b: Array, c: Array, scale: Array | float) -> Rows:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from trajopt.limits.limit import Limit, Rows
+from trajopt.limits.limit import Limit, Rows, is_linear
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
@@ -29,6 +29,10 @@ class Yielding:
     @property
     def name(self) -> str:
         return self.limit.name
+
+    @property
+    def linear(self) -> bool:
+        return is_linear(self.limit)
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         rows = self.limit.rows(path, robot)

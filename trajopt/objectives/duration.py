@@ -1,4 +1,4 @@
-"""Duration as the cost: the time that time scaling needs along the candidate path.
+"""Duration or energy as the cost: what the fastest motion along the candidate path takes.
 
 Wheel angles at the end do not depend on timing, so they are a constraint here: the violation is
 what the critical wheels' deviations exceed their tolerance by. The lattice meets it exactly and
@@ -8,6 +8,7 @@ picks the fastest solution; population methods handle it by Deb's rule.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -22,9 +23,10 @@ SEARCH_GRIDPOINTS = 60  # of the time scaling inside a search; the score uses th
 
 @dataclass(frozen=True)
 class DurationObjective(OnTerminal):
-    """Duration (s) over the free control values of ``terminal``'s problem, wheel angles as a
-    constraint."""
+    """``kind``: duration (s) or energy (J) of the fastest motion, over the free control values of
+    ``terminal``'s problem, wheel angles as a constraint."""
 
+    kind: Literal["duration", "energy"] = "duration"
     gridpoints: int = SEARCH_GRIDPOINTS
 
     @property
@@ -32,16 +34,17 @@ class DurationObjective(OnTerminal):
         offered = {Capability.BATCH, Capability.RESIDUALS}
         return frozenset(offered | ({Capability.AFFINE} if self.terminal.is_affine else set()))
 
-    def _duration(self, candidate: Array, gridpoints: int | None) -> float:
-        """Least duration, s; inf where the limits allow no motion along this path."""
+    def _cost(self, candidate: Array, gridpoints: int | None) -> float:
+        """Duration or energy; inf where the limits allow no motion along this path."""
         problem = self.terminal.problem
         try:
-            return time_scale(
+            found = time_scale(
                 self.path(candidate),
                 problem.limits,
                 robot=self.terminal.robot,
                 gridpoints=gridpoints,
-            ).duration
+            )
+            return found.duration if self.kind == "duration" else found.energy
         except InfeasibleError:
             return float(np.inf)
 
@@ -53,33 +56,31 @@ class DurationObjective(OnTerminal):
         return np.asarray(np.maximum(worst - section.wheel_tolerance, 0.0))
 
     def evaluate(self, candidates: Array) -> Evaluation:
-        """Durations are computed only where the wheel angles are within tolerance: elsewhere Deb's
+        """Costs are computed only where the wheel angles are within tolerance: elsewhere Deb's
         rule compares violations and the path length (m) stands in for the cost. Where the limits
         allow no motion, both are inf."""
         candidates = np.asarray(candidates, dtype=np.float64)
         violation = self._violation(candidates)
         cost = np.array(
             [
-                self._duration(row, self.gridpoints) if v == 0.0 else self.path(row).length
+                self._cost(row, self.gridpoints) if v == 0.0 else self.path(row).length
                 for row, v in zip(candidates, violation, strict=True)
             ]
         )
         return Evaluation(cost, np.where(np.isfinite(cost), violation, np.inf))
 
     def score(self, candidate: Array) -> Evaluation:
-        duration = self._duration(candidate, None)
-        violation = (
-            self._violation(candidate[None]) if np.isfinite(duration) else np.array([np.inf])
-        )
-        return Evaluation(np.array([duration]), violation)
+        cost = self._cost(candidate, None)
+        violation = self._violation(candidate[None]) if np.isfinite(cost) else np.array([np.inf])
+        return Evaluation(np.array([cost]), violation)
 
     def terms(self, candidate: Array) -> dict[str, float]:
-        """Named terms of one candidate (d,): the duration in s."""
-        return {"duration": self._duration(candidate, None)}
+        """Named terms of one candidate (d,): the duration in s, or the energy in J."""
+        return {self.kind: self._cost(candidate, None)}
 
     # -- the lattice, through the terminal objective
     # --------------------------------------------------
 
     def effort(self, candidates: Array) -> Array:
-        """(n,): duration, s; ranks exact solutions."""
-        return np.array([self._duration(row, self.gridpoints) for row in candidates])
+        """(n,): cost; ranks exact solutions."""
+        return np.array([self._cost(row, self.gridpoints) for row in candidates])

@@ -114,9 +114,9 @@ def _search(problem: Problem) -> None:
             "cost is always 0"
         )
         raise broken_rule("objective.kind", kind, expected)
-    if kind == "duration" and problem.actuator is not None:
+    if kind != "terminal" and problem.actuator is not None:
         expected = (
-            'none with objective.kind = "duration": a time-scaled motion keeps wheel speeds '
+            f'none with objective.kind = "{kind}": a time-scaled motion keeps wheel speeds '
             "within limits, so no drive saturates"
         )
         raise broken_rule("actuator", "given", expected)

@@ -12,14 +12,18 @@ from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.contact import Contact
 from trajopt.limits.friction import Friction
 from trajopt.limits.limit import Limit
+from trajopt.limits.motor_curve import MotorCurve
+from trajopt.limits.power import Power
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.speed_bound import SpeedZones
 from trajopt.limits.steering_acceleration import SteeringAcceleration
 from trajopt.limits.steering_rate import SteeringRate
 from trajopt.limits.tip import Tip
+from trajopt.limits.torques import knows_torques
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.limits.wheel_torque import WheelTorque
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.problem.ground import scaled
 from trajopt.robots.robot import Robot
@@ -59,6 +63,7 @@ class LimitsSection(Section):
         None, description="one, or one a [[steering]] of the robot, rad/s^2; its own bounds it too"
     )
     speed_zones: tuple[SpeedZoneSection, ...] = Field((), description="of a given path")
+    power: Positive | None = Field(None, description="of all motors together, mechanical, W")
     slip: bool = Field(False, description="stay within the ground's friction")
     slip_share: Share | None = Field(
         None, description="use only this share of the friction, with slip; absent: all of it"
@@ -93,7 +98,8 @@ class LimitsSection(Section):
         return self
 
     def limits(self, robot: Robot, friction: Friction) -> tuple[Limit, ...]:
-        """The limits that are given, as time scaling takes them, without a variant's."""
+        """The limits that are given and those of the motors, as time scaling takes them, without a
+        variant's. Torque alone is none: nothing then bounds the speed."""
         found: list[Limit] = []
         if self.speed is not None:
             found.append(Speed(self.speed))
@@ -107,6 +113,7 @@ class LimitsSection(Section):
         rate = each_wheel(self.wheel_acceleration, robot, "acceleration")
         if rate is not None:
             found.append(WheelAcceleration(rate))
+        found += self._motors(robot)
         turn = each_steering(self.steering_rate, robot, "rate")
         if turn is not None:
             found.append(SteeringRate(turn))
@@ -124,7 +131,21 @@ class LimitsSection(Section):
             found.append(Tip())
         if self.contact is not None:
             found.append(Contact(self.contact))
-        return tuple(found)
+        return () if found == [WheelTorque()] else tuple(found)
+
+    def _motors(self, robot: Robot) -> list[Limit]:
+        """What torques bound, where they are known; a power is refused where they are not."""
+        found: list[Limit] = []
+        if knows_torques(robot):
+            found.append(WheelTorque())
+            if any(motor.curve is not None for motor in robot.description.motors):
+                found.append(MotorCurve())
+        if self.power is not None:
+            if not found:
+                expected = "a robot with motors and wheels that roll"
+                raise broken_rule("limits.power", self.power, expected)
+            found.append(Power(self.power))
+        return found
 
     @property
     def share(self) -> float:

@@ -87,9 +87,10 @@ class Spline(Section):
 
 
 class ObjectiveSection(Section):
-    """Terminal cost of [guzman2015], Table 4.4, or the duration that time scaling needs."""
+    """Terminal cost of [guzman2015], Table 4.4, or duration (s) or energy (J, of the motors) of the
+    fastest motion along the path."""
 
-    kind: Literal["terminal", "duration"] = "terminal"
+    kind: Literal["terminal", "duration", "energy"] = "terminal"
     pose_gains: tuple[NonNegative, NonNegative, NonNegative] = Field(
         (3.0, 0.125, 2.5), description="on |dx|, |dy| (1/m), |dyaw| (1/rad): Table 5.8"
     )
@@ -103,6 +104,11 @@ class ObjectiveSection(Section):
     pose_tolerance: Positive = Field(
         1e-3, description="m and rad; a solution holds within it; chosen"
     )
+
+    @property
+    def unit(self) -> str:
+        """Of the cost, with a space before it; "" for the terminal one, which has none."""
+        return {"terminal": "", "duration": " s", "energy": " J"}[self.kind]
 
     @property
     def period(self) -> float:

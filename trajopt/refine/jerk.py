@@ -289,6 +289,7 @@ def _first_guess(trajectory: Trajectory, jerk: float, n: int) -> Array:
 
 def _rows(trajectory: Trajectory, s: Array) -> Stages:
     samples = trajectory.track.samples(s, trajectory.path.locate(s))
+    samples = replace(samples, sd2=np.interp(s, trajectory.s, trajectory.sd**2))
     return assemble(samples, trajectory.limits, trajectory.robot)
 
 

@@ -97,7 +97,7 @@ def _least_squares(profile: SpeedProfile, limits: tuple[Limit, ...], warm: Traje
     u = np.unique(np.concatenate([path.locate(places), np.asarray(path.basis.knots)]))
     u = u[np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])]
     u[-1] = path.end
-    fine = fine_rows(warm.track, u, limits)
+    fine = fine_rows(warm.track, u, limits, np.interp(path.parameter(u), warm.s, warm.sd**2))
     stages = stages_of(fine)
     step, n = np.diff(fine.s), len(fine.s) - 1
     first = np.interp(fine.s, warm.s, warm.sd**2)

@@ -30,8 +30,9 @@ def convergence_figure(solution: Solution, search: OptimizeResult) -> Figure:
     else:
         cost, violation = figure.add_subplot(), None
     feasible = history.violation <= FEASIBLE
-    timed = solution.problem.objective.kind == "duration"
-    if timed:  # where wheel angles miss, searches rank by violation, and the cost is no duration
+    kind, unit = solution.problem.objective.kind, solution.problem.objective.unit.strip()
+    timed = kind != "terminal"
+    if timed:  # where wheel angles miss, searches rank by violation, and the cost is none
         drawn = _curve(
             cost,
             search,
@@ -42,7 +43,7 @@ def convergence_figure(solution: Solution, search: OptimizeResult) -> Figure:
     else:
         drawn = _curve(cost, search, history.cost, feasible, search.fun)
     _log_where_wide(cost, drawn)
-    cost.set_ylabel("duration (s)" if timed else "terminal cost (–)")
+    cost.set_ylabel(f"{kind} ({unit})" if timed else "terminal cost (–)")
     if violation is not None:
         drawn = _curve(violation, search, history.violation, feasible, search.violation)
         _log_where_wide(violation, drawn)
@@ -65,7 +66,7 @@ def convergence_figure(solution: Solution, search: OptimizeResult) -> Figure:
 
 
 def _final(solution: Solution) -> str:
-    unit = " s" if solution.problem.objective.kind == "duration" else ""
+    unit = solution.problem.objective.unit
     return f"cost {solution.cost:.3g}{unit}, " if np.isfinite(solution.cost) else ""
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from trajopt.arrays import Array
+from trajopt.limits.torques import knows_torques
 from trajopt.robots.robot import Robot
 from trajopt.timing.trajectory import Trajectory
 
@@ -24,7 +26,7 @@ def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
 
     Place and posture of the body in the world (``posture``); speeds in the body frame; angles and
     speeds of all wheels, from the trajectory's ``start_wheels`` on, and steering angles and rates
-    of those that turn, castors included; ``limit`` names what binds ("" for nothing).
+    of those that turn, castors included; ``energy_j``: work of the motors so far; ``limit`` names what binds ("" for nothing).
     """
     count = max(2, int(np.ceil(trajectory.duration / SAMPLE_TIME)) + 1)
     times = np.linspace(0.0, trajectory.duration, count)
@@ -47,6 +49,8 @@ def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
         ):
             columns |= {column(wheels[i].name, quantity): values[:, i] for i in which}
     columns |= {"s_m": s, "s_dot_m_s": speed, "s_ddot_m_s2": acceleration}
+    if knows_torques(trajectory.robot):
+        columns["energy_j"] = np.interp(s, trajectory.s, trajectory.energies)
     columns["limit"] = binding_at(trajectory, times)
     return columns
 
@@ -121,7 +125,7 @@ def limit_use(trajectory: Trajectory) -> tuple[Array, Array]:
         times[j, :, 0] = trajectory.times[:-1] + 2 * (s - trajectory.s[:-1]) / (
             trajectory.sd[:-1] + np.sqrt(sd2)
         )
-        samples = trajectory.track.samples(s, here)
+        samples = replace(trajectory.track.samples(s, here), sd2=sd2)
         for k, limit in enumerate(trajectory.limits):
             rows = limit.rows(samples, trajectory.robot)
             with np.errstate(divide="ignore", invalid="ignore"):

@@ -151,6 +151,7 @@ def solution_summary(solution: Solution, *, seed: int) -> dict[str, Any]:
         "cost": solution.cost,
         "terms": solution.terms,
         "duration_s": solution.duration,
+        "energy_j": solution.energy,
         "margins": solution.margins,
         "binding_share_of_time": {} if trajectory is None else binding_shares(trajectory),
         "control_points": points,

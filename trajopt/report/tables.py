@@ -29,6 +29,8 @@ def solution_table(solution: Solution) -> Table:
     table.add_row(
         "duration", "none" if solution.trajectory is None else f"{solution.duration:.4f} s"
     )
+    if np.isfinite(solution.energy):
+        table.add_row("work of the motors", f"{solution.energy:.4g} J")
     _margin_rows(table, solution)
     for name, facts in ({} if solution.details is None else solution.details.notes).items():
         table.add_row(words(name.replace("_", " ")), words(_facts(facts)))
@@ -43,7 +45,7 @@ def solution_table(solution: Solution) -> Table:
 
 
 def _search_rows(table: Table, solution: Solution, search: OptimizeResult) -> None:
-    unit = " s" if solution.problem.objective.kind == "duration" else ""
+    unit = solution.problem.objective.unit
     table.add_row("cost", f"{_number(solution.cost)}{unit}")
     if len(solution.terms) > 1:
         for name, value in solution.terms.items():

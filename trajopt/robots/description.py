@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from trajopt.schema import NonNegative, Point, Point3, Positive, Section, broken_rule
+from trajopt.schema import NonNegative, Point, Point3, Positive, Section, Share, broken_rule
 
 Kind = Literal["fixed", "steered", "castor", "swedish", "spherical"]
 Shape = Literal["spheres", "barrel", "ellipsoid", "cylinder", "cone"]
@@ -155,6 +156,44 @@ class MotorSection(Section):
     torque: Positive = Field(description="largest, at each wheel, N m")
     speed: Positive | None = Field(None, description="largest, of a wheel, rad/s")
     acceleration: Positive | None = Field(None, description="largest, of a wheel, rad/s^2")
+    curve: tuple[Point, ...] | None = Field(
+        None,
+        description="speed, rad/s, and the most torque there, N m, of the motor's shaft, from "
+        "standing still to its fastest; linear in between. A DC motor has two points: stall "
+        "torque and free speed",
+        min_length=2,
+    )
+    gear: Positive | None = Field(
+        None, description="turns of that shaft a turn of a wheel; absent: 1, the wheel's own"
+    )
+    braking: Literal["full", "curve"] = Field(
+        "full", description="against the motion: full, up to torque; curve, as the curve too"
+    )
+    regeneration: Share | None = Field(
+        None, description="share of the work of braking that comes back; absent: none"
+    )
+
+    @model_validator(mode="after")
+    def _falling(self) -> Self:
+        if self.curve is None:
+            if self.gear is not None:
+                raise broken_rule("gear", self.gear, "a curve with it")
+            if self.braking == "curve":
+                raise broken_rule("braking", self.braking, "a curve with it")
+            return self
+        speeds, torques = zip(*self.curve, strict=True)
+        steps = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(self.curve)]
+        rising = speeds[0] == 0 and all(step[0] > 0 for step in steps)
+        if not (rising and torques[0] > 0 and torques[-1] >= 0 and all(s[1] <= 0 for s in steps)):
+            expected = "speeds that rise from 0, torques that fall from above 0 to 0 or above"
+            raise broken_rule("curve", [list(p) for p in self.curve], expected)
+        slopes = [torque / speed for speed, torque in steps]
+        level = 1 if slopes[0] == 0 else 0
+        down = all(b <= a for a, b in pairwise(slopes))
+        if not (down or all(b >= a for a, b in pairwise(slopes[level:]))):
+            expected = "torques that fall ever faster, or, after a level start, ever more slowly with speed"
+            raise broken_rule("curve", [list(p) for p in self.curve], expected)
+        return self
 
 
 class SteeringSection(Section):

@@ -11,10 +11,11 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, as_numbers, require_not_negative
 from trajopt.errors import ArgumentError, InfeasibleError
-from trajopt.limits.limit import Limit
+from trajopt.limits.limit import Limit, is_linear
 from trajopt.paths.path import Path
 from trajopt.paths.samples import require_moving
 from trajopt.robots.robot import Robot
+from trajopt.timing.compiled import forward_profile
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
 from trajopt.timing.feasibility import require_motion
 from trajopt.timing.grid import initial_grid, insert, split
@@ -23,6 +24,7 @@ from trajopt.timing.overspeed import yielding
 from trajopt.timing.rests import AT, with_rests
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
+from trajopt.timing.tangents import settled
 from trajopt.timing.track import Track, track
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ground import Ground
@@ -115,7 +117,12 @@ def time_scale(
     _require_drivable(job, u)
     if too_fast == "brake" and start_speed > 0:
         job = replace(
-            job, limits=yielding(job.limits, fine_rows(job.track, u, job.limits), job.start)
+            job,
+            limits=yielding(
+                job.limits,
+                fine_rows(job.track, u, job.limits, np.full(len(u), job.start)),
+                job.start,
+            ),
         )
     elif too_fast not in ("refuse", "brake"):
         raise ArgumentError("too_fast", too_fast, "refuse or brake")
@@ -150,10 +157,8 @@ def rough_duration(
     job = _job(path, limits, robot, None, (0.0, 0.0), "auto", ())
     u = initial_grid(path, gridpoints)
     _require_drivable(job, u)
-    fine, stages = _with_edges(job, u, 0.0)
-    profile = ENGINES[pick_engine(job.engine, stages)](stages, job.start, job.end)
-    require_motion(stages, profile)
-    speed = np.sqrt(profile[stages.kept])
+    fine, sd2, _ = _fastest(job, _with_edges(job, u), 0.0)
+    speed = np.sqrt(sd2)
     return float(
         np.sum(2 * np.diff(fine.s) / (speed[1:] + speed[:-1]))
     )  # s'' is constant between gridpoints
@@ -188,6 +193,9 @@ def _job(
         if require_not_negative(argument, speed, "m/s") > _FASTEST:
             raise ArgumentError(argument, speed, f"a path speed from 0 to {_FASTEST:g} m/s")
     require_engine(engine)
+    bent = [limit.name for limit in limits if not is_linear(limit)]
+    if bent and engine in ("linear", "segments"):
+        raise ArgumentError("engine", engine, f"auto: '{bent[0]}' is no limit for one factor")
     along = track(path, robot, ground, start[1])
     path = along.path
     expected = f"path parameters between 0 and {path.length:.6g} m"
@@ -239,24 +247,38 @@ def _stages(job: _Job, fine: FineRows, tighter: float) -> Stages:
     return replace(stages, sd2_max=ceiling, c=stages.c - tighter if tighter else stages.c)
 
 
-def _with_edges(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Stages]:
-    """Rows and stages on the grid u and on the edges of the limits."""
+def _with_edges(job: _Job, u: Array) -> FineRows:
+    """Rows on the grid u and on the edges of the limits."""
     fine = fine_rows(job.track, u, job.limits)
     if fine.edges:
         u = insert(job.path, u, np.asarray(fine.edges))
         fine = refined(job.track, fine, u, job.limits)
-    return fine, _stages(job, fine, tighter)
+    return fine
+
+
+def _fastest(job: _Job, fine: FineRows, tighter: float) -> tuple[FineRows, Array, str]:
+    """Rows, s'^2 at the gridpoints, and engine of the fastest profile on a grid."""
+
+    def solve(rows: FineRows) -> tuple[Array, str]:
+        stages = _stages(job, rows, tighter)
+        name = pick_engine(job.engine, stages)
+        profile = ENGINES[name](stages, job.start, job.end)
+        require_motion(stages, profile)
+        return profile[stages.kept], name
+
+    def reach(rows: FineRows) -> Array:
+        stages = _stages(job, rows, tighter)
+        return forward_profile(stages, job.start)[stages.kept]
+
+    return settled(job.track, job.limits, fine, solve, reach)
 
 
 def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, float, str]:
     """Rows, s'^2, the factor on it that is left, and engine, on a grid refined where limits are
     broken."""
-    fine, stages = _with_edges(job, u, tighter)
+    plain = _with_edges(job, u)
     for done in range(MOST_ROUNDS):
-        name = pick_engine(job.engine, stages)
-        profile = ENGINES[name](stages, job.start, job.end)
-        require_motion(stages, profile)
-        sd2 = profile[stages.kept]
+        fine, sd2, name = _fastest(job, plain, tighter)
         found = check(fine, sd2)
         excess = np.maximum(found.factor - 1, -found.slack.min(axis=1))
         worst = float(excess.max())
@@ -269,8 +291,7 @@ def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, floa
             )
         if done < MOST_ROUNDS - 1:
             grid = split(fine.u, excess > REFINE_ABOVE, 3)
-            fine = refined(job.track, fine, grid, job.limits)
-            stages = _stages(job, fine, tighter)
+            plain = refined(job.track, plain, grid, job.limits)
     at = int(np.argmax(excess))
     limit = job.limits[int(np.argmin(found.slack[at]))].name
     raise InfeasibleError(

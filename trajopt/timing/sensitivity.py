@@ -20,7 +20,7 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
     name.
 
     Speeds grow by that share, rows by that share of their scale (a wheel acceleration limit, mu g,
-    ...). Solved again on the trajectory's own grid, so differences are free of the grid's error.
+    ...); rows of limits that are not linear are those at the trajectory. Solved again on the trajectory's own grid, so differences are free of the grid's error.
     Raises ArgumentError for a trajectory that is not time-optimal (linear, segments), or a change
     that is not > 0.
     """
@@ -31,7 +31,7 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
             trajectory.engine,
             "a time-optimal trajectory: " + ", ".join(ENGINES),
         )
-    fine = fine_rows(trajectory.track, trajectory.u, trajectory.limits)
+    fine = fine_rows(trajectory.track, trajectory.u, trajectory.limits, trajectory.sd**2)
     stages = stages_of(fine)
     stopped = np.repeat(trajectory.sd <= 0, 2)[1:-1]
     stopped[[0, -1]] = False

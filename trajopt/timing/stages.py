@@ -2,8 +2,8 @@
 
 A profile is s'^2 at the gridpoints; between them s'' is constant, so s'^2 is linear in s. An
 interval obeys the rows at both of its ends with its own s'' (the interpolation scheme of TOPP-RA);
-whether it obeys them in between is checked on a grid ten times finer. Rows depend on the path
-alone: each interval's are computed once.
+whether it obeys them in between is checked on a grid ten times finer. Rows of linear limits depend on
+the path alone: each interval's are computed once.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.errors import ArgumentError
-from trajopt.limits.limit import Limit
+from trajopt.limits.limit import Limit, is_linear
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 from trajopt.timing.track import Track
@@ -106,30 +106,42 @@ def assemble(samples: PathSamples, limits: Sequence[Limit], robot: Robot | None)
     return Stages(samples.s, a, b, c, np.min(bounds, axis=0), names, owner, bounds, edges)
 
 
-def fine_rows(track: Track, u: Array, limits: Sequence[Limit]) -> FineRows:
-    """Rows of all limits inside every interval of the grid u (N+1,)."""
-    (share, a, b, c, bounds), some = _rows_inside(track, u[:-1], u[1:], limits)
+def fine_rows(
+    track: Track, u: Array, limits: Sequence[Limit], sd2: Array | None = None
+) -> FineRows:
+    """Rows of all limits inside every interval of the grid u (N+1,), at the profile ``sd2`` (N+1,)
+    where they are not linear."""
+    (share, a, b, c, bounds), some = _rows_inside(track, u[:-1], u[1:], limits, sd2)
     return FineRows(
         u, track.path.parameter(u), share, a, b, c, bounds, some.names, some.row_owner, some.edges
     )
 
 
 def _rows_inside(
-    track: Track, left: Array, right: Array, limits: Sequence[Limit]
+    track: Track,
+    left: Array,
+    right: Array,
+    limits: Sequence[Limit],
+    sd2: Array | None = None,
 ) -> tuple[tuple[Array, ...], Stages]:
-    """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,); and the last
-    of the pieces that they were assembled in, which has names, owners, and the edges of all."""
+    """share, a, b, c, bounds of FineRows for intervals from left (N,) to right (N,) with s'^2 at
+    their ends (N+1,); and the last of the pieces that they were assembled in, which has names,
+    owners, and the edges of all."""
     found: tuple[Array, ...] = ()
     edges: set[float] = set()
     for first in range(0, len(left), _CHUNK):
         part = slice(first, min(first + _CHUNK, len(left)))
         fine = _fine_grid(left[part], right[part])
         s = track.path.parameter(fine.ravel())
-        rows = assemble(track.samples(s, fine.ravel()), limits, track.robot)
+        samples, s = track.samples(s, fine.ravel()), s.reshape(fine.shape)
+        share = (s - s[:, :1]) / (s[:, -1:] - s[:, :1])
+        if sd2 is not None:
+            between = sd2[:-1][part, None] * (1 - share) + sd2[1:][part, None] * share
+            samples = replace(samples, sd2=between.ravel())
+        rows = assemble(samples, limits, track.robot)
         edges.update(rows.edges)
-        s = s.reshape(fine.shape)
         pieces = (
-            (s - s[:, :1]) / (s[:, -1:] - s[:, :1]),
+            share,
             *(
                 values.reshape(*fine.shape, -1)
                 for values in (rows.a, rows.b, rows.c, rows.bounds.T)
@@ -140,6 +152,20 @@ def _rows_inside(
         for target, piece in zip(found, pieces, strict=True):
             target[part] = piece
     return found, replace(rows, edges=tuple(sorted(edges)))
+
+
+def tangent(track: Track, fine: FineRows, limits: Sequence[Limit], sd2: Array) -> FineRows:
+    """``fine`` with the rows of limits that are not linear taken at the profile s'^2 (N+1,)."""
+    bent = [k for k, limit in enumerate(limits) if not is_linear(limit)]
+    if not bent:
+        return fine
+    columns = np.flatnonzero(np.isin(fine.row_owner, bent))
+    some = [limits[k] for k in bent]
+    (_, *rows, _), _ = _rows_inside(track, fine.u[:-1], fine.u[1:], some, sd2)
+    a, b, c = fine.a.copy(), fine.b.copy(), fine.c.copy()
+    for whole, part in zip((a, b, c), rows, strict=True):
+        whole[:, :, columns] = part
+    return replace(fine, a=a, b=b, c=c)
 
 
 def refined(track: Track, fine: FineRows, u: Array, limits: Sequence[Limit]) -> FineRows:

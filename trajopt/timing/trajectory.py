@@ -17,6 +17,7 @@ from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.robots.steering import steering_of
+from trajopt.timing.energy import energies
 from trajopt.timing.rests import Rest, rests_of
 from trajopt.timing.stages import Check, check, fine_rows
 from trajopt.timing.track import Track
@@ -116,6 +117,18 @@ class Trajectory:
         """Duration, s."""
         return float(self.times[-1])
 
+    @cached_property
+    def energies(self) -> Array:
+        """(N+1,): work of the motors from the start to each gridpoint, J; see
+        ``timing.energy``."""
+        return energies(self)
+
+    @property
+    def energy(self) -> float:
+        """Work of the motors, J: mechanical, where they drive, less what braking gives back by the
+        robot's file. Raises ArgumentError for robots whose torques are not known."""
+        return float(self.energies[-1])
+
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,
         duration]."""
@@ -209,7 +222,7 @@ class Trajectory:
 
     @cached_property
     def _check(self) -> Check:
-        return check(fine_rows(self.track, self.u, self.limits), self.sd**2)
+        return check(fine_rows(self.track, self.u, self.limits, self.sd**2), self.sd**2)
 
     @cached_property
     def track(self) -> Track:
