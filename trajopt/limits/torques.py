@@ -18,7 +18,7 @@ from trajopt.limits.limit import spins
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
-_SLOWEST = 1e-6  # m/s, chosen: below it the tangent of a root is too steep to compute with
+_SLOWEST = 1e-4  # m/s, chosen: below it the tangent of a root is too steep to compute with
 
 
 def ground_torques(path: PathSamples, robot: Robot) -> Affine:
