@@ -190,7 +190,7 @@ def test_two_robots_drive_the_same_field_with_the_same_commands(robot, tmp_path)
     x, y, z = (table[f"{axis}_m"].to_numpy() for axis in "xyz")
     # the body stands on the mean of the heights under its wheels, less what tilt takes
     assert np.abs(z - problem.scene.ground.height(x, y)).max() < 0.02
-    assert np.ptp(z) > 0.04
+    assert np.ptp(z) > 0.03  # it goes up and down
     told = trajopt("explain", out)
     assert told.returncode == 0, told.stderr
     assert "pitch" in told.stdout

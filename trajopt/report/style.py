@@ -44,6 +44,8 @@ LIMIT_COLOURS: Mapping[str, str] = MappingProxyType(
         "steering_rate": "#5e3c99",  # chosen: two violets that the rest has not
         "steering_acceleration": "#b2abd2",
         "contact": GREY,
+        "wheel_torque": "#8c510a",  # chosen: two browns
+        "motor_curve": "#bf812d",
     }
 )
 _SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed
