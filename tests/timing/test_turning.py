@@ -66,9 +66,18 @@ def wandering(seed: int) -> Path:
     return Path.through(np.cumsum(np.column_stack([np.cos(turn), np.sin(turn)]) * step, axis=0))
 
 
-@pytest.mark.parametrize("path", [WAVE, *(wandering(seed) for seed in range(30))])
+def bow(side: float, sharpness: float) -> Path:
+    """One segment whose curvature is greatest somewhere inside."""
+    ends = {"start_direction": [5.2, 0.0], "end_direction": [0.0, side * sharpness]}
+    return Path.through([[0, 0], [2.4, side * 2.4]], knots=[0, 1], **ends)
+
+
+BOWS = [bow(side, sharpness) for side in (1, -1) for sharpness in (4.1, 4.7, 5.6)]
+
+
+@pytest.mark.parametrize("path", [WAVE, *(wandering(seed) for seed in range(20)), *BOWS])
 def test_a_range_is_judged_between_the_places_of_the_table(path: Path) -> None:
-    # 1e-5 rad on either side of the greatest angle, which lies somewhere inside a cell
+    # 1e-5 rad on either side of the greatest angle, at a knot or somewhere inside a cell
     u = np.union1d(np.linspace(path.start, path.end, 40001), path.basis.knots)
     d, dd = path.position(u, 1), path.position(u, 2)
     kappa = (d[:, 0] * dd[:, 1] - d[:, 1] * dd[:, 0]) / np.hypot(d[:, 0], d[:, 1]) ** 3
