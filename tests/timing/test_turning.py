@@ -16,6 +16,7 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.path import Path
 from trajopt.robots import robot
 from trajopt.timing.scaling import time_scale
+from trajopt.timing.track import track
 
 PACE = [Speed(1.0), Acceleration(1.0, 1.0)]
 WAVE = Path.through([[0, 0], [2, 1], [4, 0]])
@@ -57,20 +58,34 @@ def test_a_bend_beyond_the_range_is_refused_with_place_and_radius(side: float) -
     assert found.place == pytest.approx(first, abs=0.05)
 
 
-@pytest.mark.parametrize("path", [WAVE, Path.through([[0, 0], [2, 1], [4.1, 0.2], [5.2, 0.9]])])
+def wandering(seed: int) -> Path:
+    """Through a few points, bending either way."""
+    rng = np.random.default_rng(seed)
+    turn = np.cumsum(rng.uniform(-0.5, 0.5, 5))
+    step = rng.uniform(0.6, 1.8, 5)[:, None]
+    return Path.through(np.cumsum(np.column_stack([np.cos(turn), np.sin(turn)]) * step, axis=0))
+
+
+def bow(side: float, sharpness: float) -> Path:
+    """One segment whose curvature is greatest somewhere inside."""
+    ends = {"start_direction": [5.2, 0.0], "end_direction": [0.0, side * sharpness]}
+    return Path.through([[0, 0], [2.4, side * 2.4]], knots=[0, 1], **ends)
+
+
+BOWS = [bow(side, sharpness) for side in (1, -1) for sharpness in (4.1, 4.7, 5.6)]
+
+
+@pytest.mark.parametrize("path", [WAVE, *(wandering(seed) for seed in range(20)), *BOWS])
 def test_a_range_is_judged_between_the_places_of_the_table(path: Path) -> None:
-    # 1e-5 rad on either side of the greatest angle, which lies somewhere inside a cell
-    u = np.linspace(path.start, path.end, 400001)
+    # 1e-5 rad on either side of the greatest angle, at a knot or somewhere inside a cell
+    u = np.union1d(np.linspace(path.start, path.end, 40001), path.basis.knots)
     d, dd = path.position(u, 1), path.position(u, 2)
     kappa = (d[:, 0] * dd[:, 1] - d[:, 1] * dd[:, 0]) / np.hypot(d[:, 0], d[:, 1]) ** 3
     most = float(np.arctan(BASE * np.abs(kappa)).max())
-    for end in (most + 1e-5, most - 1e-5):
-        one = robot("car", {"steering.0.range": [-end, end]})
-        if end > most:
-            time_scale(path, PACE, robot=one)
-            continue
-        with pytest.raises(InfeasibleError, match="its range ends at"):
-            time_scale(path, PACE, robot=one)
+    track(path, robot("car", {"steering.0.range": [-most - 1e-5, most + 1e-5]})).turning  # noqa: B018
+    less = robot("car", {"steering.0.range": [1e-5 - most, most - 1e-5]})
+    with pytest.raises(InfeasibleError, match="its range ends at"):
+        track(path, less).turning  # noqa: B018
 
 
 def test_the_radius_that_would_do_holds_for_a_wheel_off_the_middle() -> None:

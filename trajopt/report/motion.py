@@ -91,11 +91,14 @@ def most(trajectory: Trajectory) -> list[tuple[str, str, float]]:
 
 
 def binding_at(trajectory: Trajectory, times: Array) -> list[str]:
-    """Name of the limit that binds at each time (s), "" where none does."""
+    """Name of the limit that binds at each time (s), "" where none does, or where the robot rests
+    while wheels turn."""
     interval = np.clip(
         np.searchsorted(trajectory.times, times, side="right") - 1, 0, len(trajectory.sdd) - 1
     )
-    return [trajectory.binding[i] for i in interval]
+    left = trajectory.times[interval + 1] - times
+    waits = (left < trajectory.waits[interval + 1]) | (times < trajectory.times[0])
+    return ["" if w else trajectory.binding[i] for i, w in zip(interval, waits, strict=True)]
 
 
 def binding_shares(trajectory: Trajectory) -> dict[str, float]:

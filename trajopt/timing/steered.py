@@ -85,7 +85,7 @@ def _close_places(path: Path, steering: Steering, motion: Motion, inner: Array) 
     does so at once."""
     jumps = np.append(inner, path.basis.knots[1:-1])  # of directions, or of derivatives
     u = np.concatenate([cells(path, _CELLS), inner, np.nextafter(jumps, -np.inf)])
-    span, u = path.end - path.start, np.unique(u)
+    span, u = np.ptp(path.basis.knots), np.unique(u)
     for _ in range(_ROUNDS):
         samples, bend = motion(path.parameter(u), u)
         assert bend is not None
