@@ -21,6 +21,7 @@ from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.simulate.bullet import OUTLINE, WHEELS, Client, build_stage, load_robot, shoot
+from trajopt.simulate.bullet_grip import Grip
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
 from trajopt.simulate.model import Model, cross
 from trajopt.simulate.scene import Stage
@@ -37,7 +38,6 @@ MAX_JOINT_SPEED = 1e4
 # assume. Hard rollers on four wheels leave two of them without load; at 0.8, those of turning wheels
 # carry 3/4 of a robot that moves diagonally, as each comes down on the ground at speed (measured).
 TYRE_SAG, TYRE_DAMPING, ROLLER_DAMPING = 0.001, 0.8, 0.2
-GRIP_ERROR = 0.01  # share by which the friction of rollers may be off, chosen
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -92,7 +92,7 @@ class PyBullet:
                 fixedTimeStep=self.step,
                 numSolverIterations=self.solver_iterations,
                 # Bullet's cone lets the wheel of an axle that comes first hold all it can across,
-                # and then spin (measured: PowerBot along a slope turned by 40 deg): see _grip
+                # and then spin (measured: PowerBot along a slope turned by 40 deg): see Grip
                 enableConeFriction=0,
                 contactBreakingThreshold=self.contact_breaking_threshold,
                 erp=self.contact_erp,
@@ -163,20 +163,7 @@ class _Session:
             # small angles keep their digits: whole turns are added when reading
             bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
             self.offset[link] = float(angle - fold(float(angle)))
-        # links of each wheel that touch the ground; of those with rollers the lowest one's axis
-        found = [np.flatnonzero(model.is_roller & (model.parents == foot)) for foot in model.feet]
-        self.rolling = [k for k, rollers in enumerate(found) if len(rollers)]
-        self.gripping = [
-            rollers.tolist() if len(rollers) else [foot]
-            for rollers, foot in zip(found, model.feet, strict=True)
-        ]
-        lowest = [min(found[k], key=lambda i: model.frames[i][0][2]) for k in self.rolling]
-        self.axes = np.array([model.frames[i][1][:, 2] for i in lowest]).reshape(-1, 3)
-        self.tyre_of = {
-            self.joint[links[0]]: k
-            for k, links in enumerate(self.gripping) if k not in self.rolling
-        }  # fmt: skip
-        self.grips = np.ones(len(model.feet))
+        self.grip = Grip(bullet, model, self.robot, self.joint, stage.scene.friction)
         self.turns = np.array([self.offset[link] for link in model.targets])
         self.before: Array | None = None
         links = model.links
@@ -251,7 +238,7 @@ class _Session:
                 robot, self.steered, bullet.POSITION_CONTROL, targetPositions=self.before.tolist(),
                 targetVelocities=rates.tolist(), forces=self.powers,
             )  # fmt: skip
-        self._grip()
+        self.grip.update()
         if self.forced:
             self.rests[self.commanded] = angles[count:]
             now, speeds, _ = self.joints(tuple(self.forced))
@@ -261,33 +248,6 @@ class _Session:
                 forces=np.clip(forces, -self.most, self.most).tolist(),
             )  # fmt: skip
         bullet.stepSimulation()
-
-    def _grip(self) -> None:
-        """Friction of all wheels, set anew where what they hold has turned.
-
-        Bullet bounds two directions of friction, of which the first has no x, each by itself. A
-        tyre that pulls between them would hold too well: it gets the friction at which the bounds'
-        corner holds what it should. Rollers have both directions laid along their axes, each as
-        long as its share: together they hold |c1| + |c2| times what one does.
-        """
-        wanted = self.grips.copy()
-        if len(self.axes):
-            _, attitude = self.bullet.getBasePositionAndOrientation(self.robot)
-            turn = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
-            first = np.array([0.0, -turn[2, 2], turn[1, 2]]) / math.hypot(turn[1, 2], turn[2, 2])
-            share = np.abs(self.axes @ turn.T @ first)
-            wanted[self.rolling] = 1.0 / (share + np.sqrt(np.maximum(1.0 - share**2, 0.0)))
-        if len(self.axes) < len(wanted):
-            for p in self.bullet.getContactPoints(bodyA=self.robot):
-                wheel = self.tyre_of.get(p[3], -1)
-                force = math.hypot(p[10], p[12])
-                if wheel >= 0 and force > 0.0:
-                    wanted[wheel] = max(abs(p[10]), abs(p[12])) / force
-        for k in np.flatnonzero(np.abs(wanted - self.grips) > GRIP_ERROR * wanted):
-            self.grips[k] = wanted[k]
-            for i in self.gripping[k]:
-                grip = float(wanted[k]) * self.model.links[i].grip * self.stage.scene.friction
-                self.bullet.changeDynamics(self.robot, self.joint[i], lateralFriction=grip)
 
     def base(self) -> Motion:
         """See ``engine.Session``."""
