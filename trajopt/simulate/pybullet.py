@@ -6,7 +6,6 @@ option.
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -20,12 +19,23 @@ from numpy.typing import NDArray
 from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.robots.robot import STANDARD_GRAVITY
-from trajopt.simulate.bullet import OUTLINE, WHEELS, Client, build_stage, load_robot, shoot
+from trajopt.simulate.bullet import (
+    OUTLINE,
+    WHEELS,
+    Client,
+    add_plates,
+    build_stage,
+    load_robot,
+    plate_filter,
+    shoot,
+)
 from trajopt.simulate.bullet_grip import Grip
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
 from trajopt.simulate.model import Model, cross
+from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
+from trajopt.simulate.tyres import give
 
 # Joints that one Bullet multibody can report; with more, joint states silently read zero
 # (measured).
@@ -33,11 +43,6 @@ MAX_JOINTS = 121
 # Bullet stops joints at 100 rad/s unless told otherwise; a roller of 9.5 mm turns at 124 rad/s in
 # lateral motion at 3 km/h [rad/s].
 MAX_JOINT_SPEED = 1e4
-# Tyres and rollers on smooth ground give way by this much under the robot's weight, m, at these
-# shares of critical damping, chosen: contacts that are equally soft share the load as the limits
-# assume. Hard rollers on four wheels leave two of them without load; at 0.8, those of turning wheels
-# carry 3/4 of a robot that moves diagonally, as each comes down on the ground at speed (measured).
-TYRE_SAG, TYRE_DAMPING, ROLLER_DAMPING = 0.001, 0.8, 0.2
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -145,6 +150,10 @@ class _Session:
         self.solids = build_stage(bullet, stage, visible)
         self.robot = load_robot(bullet, model, start, visible)
         self.cog = np.array(model.links[0].cog)
+        self.plates = Plates(model, stage) if stage.plates else None
+        self.bodies = add_plates(bullet, len(model.feet) if stage.plates else 0)
+        self.solids |= dict.fromkeys(self.bodies, -1)
+        self.middle = start.place
         # Bullet numbers joints as it walks the tree; -1 is the base
         names = [
             bullet.getJointInfo(self.robot, joint)[1].decode()
@@ -207,14 +216,12 @@ class _Session:
         rolls = link.joint.role == "roller"
         if rolls:  # friction along the axis alone: light rollers would never get up to speed
             bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
-        ball = number in self.model.feet and link.shapes[:1] and link.shapes[0].kind == "sphere"
-        if ball or (rolls and not self.stage.broken):
-            load = self.model.mass / len(self.model.feet)
-            stiffness = load * STANDARD_GRAVITY / TYRE_SAG
-            share = ROLLER_DAMPING if rolls else TYRE_DAMPING
-            give = share * 2.0 * math.sqrt(stiffness * load)
-            bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=give)
+        soft = None if self.stage.broken and rolls else give(self.model, link)
+        if soft is not None:
+            bullet.changeDynamics(robot, joint, contactStiffness=soft[0], contactDamping=soft[1])
         meets = WHEELS if link.meets == "ground" else OUTLINE
+        if link.wheel >= 0 and self.plates is not None:
+            meets = plate_filter(link.wheel)
         bullet.setCollisionFilterGroupMask(robot, joint, *meets)
         if joint >= 0:  # every joint is born with a motor that brakes it
             bullet.setJointMotorControl2(robot, joint, bullet.VELOCITY_CONTROL, force=0.0)
@@ -238,6 +245,8 @@ class _Session:
                 robot, self.steered, bullet.POSITION_CONTROL, targetPositions=self.before.tolist(),
                 targetVelocities=rates.tolist(), forces=self.powers,
             )  # fmt: skip
+        if self.plates is not None:
+            self._move_plates(self.plates)
         self.grip.update()
         if self.forced:
             self.rests[self.commanded] = angles[count:]
@@ -248,6 +257,16 @@ class _Session:
                 forces=np.clip(forces, -self.most, self.most).tolist(),
             )  # fmt: skip
         bullet.stepSimulation()
+
+    def _move_plates(self, plates: Plates) -> None:
+        """Plates turn about the place where the robot began: Bullet keeps contacts by where they
+        are on them."""
+        plates.move(self.motion(self.model.feet).place)
+        up = plates.normal / plates.normal[:, 2:]
+        height = np.sum(up * (plates.place - self.middle), axis=1)
+        for body, z, (w, *vector) in zip(self.bodies, height, plates.quaternions(), strict=True):
+            place = self.middle + np.array([0.0, 0.0, z])
+            self.bullet.resetBasePositionAndOrientation(body, place.tolist(), (*vector, w))
 
     def base(self) -> Motion:
         """See ``engine.Session``."""
