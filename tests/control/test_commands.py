@@ -104,10 +104,11 @@ def tracked(
     wheels, errors = np.zeros(2), []
     for k in range(round((plan.duration + tracker.settle) / PERIOD)):
         t = k * PERIOD
-        order = control.step(t, Measured(wheels, wheels, pose=pose, deviations=np.zeros(3)))
+        seen = Measured(wheels, wheels, np.zeros(2), pose, np.zeros(3))
+        order = control.step(t, seen)
         turned = order.wheel_speeds * (1 + drift + noise * rng.standard_normal(2)) * PERIOD
         wheels = wheels + turned
-        pose = predict(Estimate(pose, np.zeros((3, 3))), robot, turned).pose
+        pose = predict(Estimate(pose, np.zeros((3, 3))), robot, robot.forward @ turned).pose
         errors.append(pose - plan.at(min(t + PERIOD, plan.duration)).pose[0])
     return np.array(errors)
 
@@ -122,9 +123,3 @@ def test_tracker_without_errors_changes_nothing(plan: Trajectory) -> None:
     errors = tracked(plan, Tracker(), np.zeros(3), np.zeros(2), 0.0)
     assert np.hypot(*errors[:, :2].T).max() < 5e-3
     assert np.hypot(*errors[-1, :2]) < 2e-3
-
-
-def test_tracking_is_refused_where_wheels_have_to_be_steered(plan: Trajectory) -> None:
-    for name in ("car", "loc8"):
-        with pytest.raises(ArgumentError, match="without steering"):
-            TrackingController(plan, Tracker(), shipped(name))

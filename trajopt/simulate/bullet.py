@@ -68,6 +68,22 @@ def build_stage(bullet: Client, stage: Stage, visible: bool) -> dict[int, int]:
     return found
 
 
+def add_plates(bullet: Client, count: int) -> list[int]:
+    """Planes that a wheel each meets."""
+    found = []
+    for wheel in range(count):
+        shape = bullet.createCollisionShape(bullet.GEOM_PLANE)
+        found.append(int(bullet.createMultiBody(0.0, shape)))
+        bullet.changeDynamics(found[-1], -1, lateralFriction=1.0, restitution=0.0)
+        bullet.setCollisionFilterGroupMask(found[-1], -1, *plate_filter(wheel))
+    return found
+
+
+def plate_filter(wheel: int) -> tuple[int, int]:
+    """Group and mask of a wheel and its plate."""
+    return 1 << (5 + wheel), 1 << (5 + wheel)
+
+
 def _field(bullet: Client, field: HeightMap) -> int:
     """The height field, turned by a quarter, since Bullet cuts cells along the other diagonal
     than the map does. Data are Z[y, x].ravel() with "rows" counting x, and the wrong order

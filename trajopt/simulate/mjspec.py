@@ -15,10 +15,9 @@ from trajopt.world.height_map import HeightMap
 # never each other.
 WHEELS, GROUND, OUTLINE, OBSTACLES, NOTHING = (1, 2), (2, 1), (4, 8), (8, 4), (0, 0)
 ROTOR = 1e5  # kg m^2, chosen: no torque of a wheel changes its speed
-# On smooth ground, chosen: friction is that much stiffer than the contact (on slopes robots creep by
-# a tenth of what they do at 1), and rollers, which bounce at the shortest time constant, have this
-# one, s (measured on a Mecanum robot: the loads scatter by a third of what they do at 4 ms)
-FRICTION_IMPEDANCE, ROLLER_TIME = 10.0, 0.01
+# On smooth ground, chosen: friction is that much stiffer than the contact (at 1 robots creep down
+# slopes), and this is the impedance of soft contacts (the closer to 1, the more they act like mass)
+FRICTION_IMPEDANCE, SOFT_IMPEDANCE = 100.0, 0.5
 STEERING_RATE = 100.0  # rad/s, natural frequency of a steering servo with its gear; chosen
 GROUND_COLOUR: Colour = (0.75, 0.62, 0.42)
 
@@ -60,6 +59,7 @@ class SpecBuilder:
         spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        self.plates = len(model.feet) if stage.plates else 0
         self._add_stage(stage)
         bodies: list[Any] = []
         for i, link in enumerate(model.links):
@@ -88,6 +88,10 @@ class SpecBuilder:
             ground.quat = Pose.along(stage.plane.normal).quaternion
         if stage.field is not None:
             self._field(stage.field)
+        for k in range(self.plates):
+            plate = world.add_body(name=f"plate_{k}", mocap=True)
+            made = self._geom(plate, f"plate_{k}", kinds.mjGEOM_PLANE, [0, 0, 1], (0, _bit(k)))
+            made.rgba = [0.0, 0.0, 0.0, 0.0]
         for i, solid in enumerate(stage.solids):
             bits, body = GROUND, world
             if solid.meets == "obstacles":
@@ -133,16 +137,15 @@ class SpecBuilder:
             if joint.drive == "position":
                 made.armature = joint.stiffness / STEERING_RATE**2
         bits = WHEELS if link.meets == "ground" else OUTLINE
+        if link.wheel >= 0 and self.plates:
+            bits = (_bit(link.wheel), 0)
         same = link.shapes == link.looks
         for i, shape in enumerate(link.shapes):
             colour = link.colour if same else None
             geom = self._shape(body, f"{name}_{i}", shape, bits, colour)
             geom.friction = [link.grip * self.friction, 0.0, 0.0]
-            if joint.role == "roller" and self.smooth:
-                geom.solref = [max(ROLLER_TIME, self.options.contact_time), 1.0]
-                geom.priority = 1  # else it is the mean with the ground's
             # friction is the larger of two, unless one has priority
-            geom.priority = int(geom.priority or link.grip < 1.0)
+            geom.priority = int(link.grip < 1.0)
         for i, shape in enumerate(() if same else link.looks):
             self._shape(body, f"{name}_look_{i}", shape, NOTHING, link.colour)
         return body
@@ -207,6 +210,11 @@ class SpecBuilder:
         geom.friction = [self.friction, 0.0, 0.0]
         geom.solref = [self.options.contact_time, self.options.contact_damping]
         return geom
+
+
+def _bit(wheel: int) -> int:
+    """What a wheel and its plate collide by."""
+    return 1 << (4 + wheel)
 
 
 def _set_linear(joint: Any, name: str, value: float) -> None:

@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from trajopt.arrays import Array, IndexArray, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
-from trajopt.simulate.mjspec import STEERING_RATE, SpecBuilder
+from trajopt.simulate.mjspec import SOFT_IMPEDANCE, STEERING_RATE, SpecBuilder
 from trajopt.simulate.model import Model, cross, quaternion_of
+from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
+from trajopt.simulate.tyres import TYRE_SAG, give
 
 # Why this process has no graphics, once known: asked a second time, GLFW aborts the process.
 _NO_GRAPHICS: list[str] = []
@@ -72,6 +74,8 @@ class MuJoCo:
                 f"mujoco could not build the robot {model.name!r}: {error}"
             ) from error
         session = _Session(mujoco, compiled, model, stage)
+        if not stage.broken:
+            session.soften()
         session.place(start)
         yield session
 
@@ -113,8 +117,32 @@ class _Session:
         owner = {b: i for i, b in enumerate(body)}
         self.link_of = np.array([owner.get(int(b), -1) for b in compiled.geom_bodyid])
         self.solid_of = np.full(compiled.ngeom, -1)
+        self.plates = Plates(model, stage) if stage.plates else None
+        names = [f"plate_{k}" for k in range(len(model.feet) if stage.plates else 0)]
+        self.mocap = [int(compiled.body(name).mocapid[0]) for name in names]
         for i in range(len(stage.solids)):
             self.solid_of[compiled.geom(f"solid_{i}").id] = i
+
+    def soften(self) -> None:
+        """Makes tyres and rollers as soft as ``tyres.give`` says.
+
+        Solref's direct form k, b acts in acceleration, through the regularisation R = (1 - d)/d A of
+        a body with the inverse weight A: force = (k r + b v) / ((1 - d) A), with d the impedance.
+        The contact is halfway between two surfaces: half the sag more radius keeps the lever.
+        """
+        compiled, d = self.compiled, SOFT_IMPEDANCE
+        for geom in np.flatnonzero((self.link_of >= 0) & (compiled.geom_contype > 0)):
+            link = self.model.links[self.link_of[geom]]
+            soft = give(self.model, link)
+            if soft is None:
+                continue
+            weight = (1.0 - d) * compiled.body_invweight0[compiled.geom_bodyid[geom], 0]
+            compiled.geom_solref[geom] = [-soft[0] * weight, -soft[1] * weight]
+            compiled.geom_solimp[geom] = [d, d, 0.001, 0.5, 2.0]
+            compiled.geom_priority[geom] = 1
+            if compiled.geom_type[geom] == self.mujoco.mjtGeom.mjGEOM_SPHERE:
+                compiled.geom_size[geom, 0] += TYRE_SAG / 2.0
+                compiled.geom_rbound[geom] += TYRE_SAG / 2.0
 
     def place(self, start: Start) -> None:
         """Put the robot where it begins. Small angles keep their digits: whole turns are added
@@ -128,6 +156,10 @@ class _Session:
 
     def advance(self, wheel_speeds: Array, angles: Array) -> None:
         """See ``engine.Session``."""
+        if self.plates is not None:
+            self.plates.move(self.data.xpos[self.body[list(self.model.feet)]])
+            self.data.mocap_pos[self.mocap] = self.plates.place
+            self.data.mocap_quat[self.mocap] = self.plates.quaternions()
         self.data.qvel[self.rotors] = wheel_speeds[self.driven]
         self.data.ctrl[:] = self._leading(angles)
         self.mujoco.mj_step(self.compiled, self.data)

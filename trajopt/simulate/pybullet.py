@@ -6,7 +6,6 @@ option.
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 from collections.abc import Iterator
@@ -20,11 +19,23 @@ from numpy.typing import NDArray
 from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError, MissingDependencyError, SimulationError
 from trajopt.robots.robot import STANDARD_GRAVITY
-from trajopt.simulate.bullet import OUTLINE, WHEELS, Client, build_stage, load_robot, shoot
+from trajopt.simulate.bullet import (
+    OUTLINE,
+    WHEELS,
+    Client,
+    add_plates,
+    build_stage,
+    load_robot,
+    plate_filter,
+    shoot,
+)
+from trajopt.simulate.bullet_grip import Grip
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
 from trajopt.simulate.model import Model, cross
+from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
+from trajopt.simulate.tyres import give
 
 # Joints that one Bullet multibody can report; with more, joint states silently read zero
 # (measured).
@@ -32,12 +43,6 @@ MAX_JOINTS = 121
 # Bullet stops joints at 100 rad/s unless told otherwise; a roller of 9.5 mm turns at 124 rad/s in
 # lateral motion at 3 km/h [rad/s].
 MAX_JOINT_SPEED = 1e4
-# Tyres and rollers on smooth ground give way by this much under the robot's weight, m, at these
-# shares of critical damping, chosen: contacts that are equally soft share the load as the limits
-# assume. Hard rollers on four wheels leave two of them without load; at 0.8, those of turning wheels
-# carry 3/4 of a robot that moves diagonally, as each comes down on the ground at speed (measured).
-TYRE_SAG, TYRE_DAMPING, ROLLER_DAMPING = 0.001, 0.8, 0.2
-GRIP_ERROR = 0.01  # share by which the friction of rollers may be off, chosen
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -92,7 +97,7 @@ class PyBullet:
                 fixedTimeStep=self.step,
                 numSolverIterations=self.solver_iterations,
                 # Bullet's cone lets the wheel of an axle that comes first hold all it can across,
-                # and then spin (measured: PowerBot along a slope turned by 40 deg): see _grip
+                # and then spin (measured: PowerBot along a slope turned by 40 deg): see Grip
                 enableConeFriction=0,
                 contactBreakingThreshold=self.contact_breaking_threshold,
                 erp=self.contact_erp,
@@ -145,6 +150,10 @@ class _Session:
         self.solids = build_stage(bullet, stage, visible)
         self.robot = load_robot(bullet, model, start, visible)
         self.cog = np.array(model.links[0].cog)
+        self.plates = Plates(model, stage) if stage.plates else None
+        self.bodies = add_plates(bullet, len(model.feet) if stage.plates else 0)
+        self.solids |= dict.fromkeys(self.bodies, -1)
+        self.middle = start.place
         # Bullet numbers joints as it walks the tree; -1 is the base
         names = [
             bullet.getJointInfo(self.robot, joint)[1].decode()
@@ -163,20 +172,7 @@ class _Session:
             # small angles keep their digits: whole turns are added when reading
             bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
             self.offset[link] = float(angle - fold(float(angle)))
-        # links of each wheel that touch the ground; of those with rollers the lowest one's axis
-        found = [np.flatnonzero(model.is_roller & (model.parents == foot)) for foot in model.feet]
-        self.rolling = [k for k, rollers in enumerate(found) if len(rollers)]
-        self.gripping = [
-            rollers.tolist() if len(rollers) else [foot]
-            for rollers, foot in zip(found, model.feet, strict=True)
-        ]
-        lowest = [min(found[k], key=lambda i: model.frames[i][0][2]) for k in self.rolling]
-        self.axes = np.array([model.frames[i][1][:, 2] for i in lowest]).reshape(-1, 3)
-        self.tyre_of = {
-            self.joint[links[0]]: k
-            for k, links in enumerate(self.gripping) if k not in self.rolling
-        }  # fmt: skip
-        self.grips = np.ones(len(model.feet))
+        self.grip = Grip(bullet, model, self.robot, self.joint, stage.scene.friction)
         self.turns = np.array([self.offset[link] for link in model.targets])
         self.before: Array | None = None
         links = model.links
@@ -220,14 +216,12 @@ class _Session:
         rolls = link.joint.role == "roller"
         if rolls:  # friction along the axis alone: light rollers would never get up to speed
             bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
-        ball = number in self.model.feet and link.shapes[:1] and link.shapes[0].kind == "sphere"
-        if ball or (rolls and not self.stage.broken):
-            load = self.model.mass / len(self.model.feet)
-            stiffness = load * STANDARD_GRAVITY / TYRE_SAG
-            share = ROLLER_DAMPING if rolls else TYRE_DAMPING
-            give = share * 2.0 * math.sqrt(stiffness * load)
-            bullet.changeDynamics(robot, joint, contactStiffness=stiffness, contactDamping=give)
+        soft = None if self.stage.broken and rolls else give(self.model, link)
+        if soft is not None:
+            bullet.changeDynamics(robot, joint, contactStiffness=soft[0], contactDamping=soft[1])
         meets = WHEELS if link.meets == "ground" else OUTLINE
+        if link.wheel >= 0 and self.plates is not None:
+            meets = plate_filter(link.wheel)
         bullet.setCollisionFilterGroupMask(robot, joint, *meets)
         if joint >= 0:  # every joint is born with a motor that brakes it
             bullet.setJointMotorControl2(robot, joint, bullet.VELOCITY_CONTROL, force=0.0)
@@ -251,7 +245,9 @@ class _Session:
                 robot, self.steered, bullet.POSITION_CONTROL, targetPositions=self.before.tolist(),
                 targetVelocities=rates.tolist(), forces=self.powers,
             )  # fmt: skip
-        self._grip()
+        if self.plates is not None:
+            self._move_plates(self.plates)
+        self.grip.update()
         if self.forced:
             self.rests[self.commanded] = angles[count:]
             now, speeds, _ = self.joints(tuple(self.forced))
@@ -262,32 +258,15 @@ class _Session:
             )  # fmt: skip
         bullet.stepSimulation()
 
-    def _grip(self) -> None:
-        """Friction of all wheels, set anew where what they hold has turned.
-
-        Bullet bounds two directions of friction, of which the first has no x, each by itself. A
-        tyre that pulls between them would hold too well: it gets the friction at which the bounds'
-        corner holds what it should. Rollers have both directions laid along their axes, each as
-        long as its share: together they hold |c1| + |c2| times what one does.
-        """
-        wanted = self.grips.copy()
-        if len(self.axes):
-            _, attitude = self.bullet.getBasePositionAndOrientation(self.robot)
-            turn = np.array(self.bullet.getMatrixFromQuaternion(attitude)).reshape(3, 3)
-            first = np.array([0.0, -turn[2, 2], turn[1, 2]]) / math.hypot(turn[1, 2], turn[2, 2])
-            share = np.abs(self.axes @ turn.T @ first)
-            wanted[self.rolling] = 1.0 / (share + np.sqrt(np.maximum(1.0 - share**2, 0.0)))
-        if len(self.axes) < len(wanted):
-            for p in self.bullet.getContactPoints(bodyA=self.robot):
-                wheel = self.tyre_of.get(p[3], -1)
-                force = math.hypot(p[10], p[12])
-                if wheel >= 0 and force > 0.0:
-                    wanted[wheel] = max(abs(p[10]), abs(p[12])) / force
-        for k in np.flatnonzero(np.abs(wanted - self.grips) > GRIP_ERROR * wanted):
-            self.grips[k] = wanted[k]
-            for i in self.gripping[k]:
-                grip = float(wanted[k]) * self.model.links[i].grip * self.stage.scene.friction
-                self.bullet.changeDynamics(self.robot, self.joint[i], lateralFriction=grip)
+    def _move_plates(self, plates: Plates) -> None:
+        """Plates turn about the place where the robot began: Bullet keeps contacts by where they
+        are on them."""
+        plates.move(self.motion(self.model.feet).place)
+        up = plates.normal / plates.normal[:, 2:]
+        height = np.sum(up * (plates.place - self.middle), axis=1)
+        for body, z, (w, *vector) in zip(self.bodies, height, plates.quaternions(), strict=True):
+            place = self.middle + np.array([0.0, 0.0, z])
+            self.bullet.resetBasePositionAndOrientation(body, place.tolist(), (*vector, w))
 
     def base(self) -> Motion:
         """See ``engine.Session``."""

@@ -64,6 +64,11 @@ class Stage:
         return rough or any(isinstance(o, Step) for o in self.scene.obstacles)
 
     @property
+    def plates(self) -> bool:
+        """Whether wheels meet planes that move along with them, instead of the ``field``."""
+        return self.field is not None and not self.broken
+
+    @property
     def has_obstacles(self) -> bool:
         return any(solid.meets == "obstacles" for solid in self.solids)
 

@@ -1,16 +1,23 @@
-"""Links of wheels with a plain tyre, and of balls."""
+"""Links of wheels with a plain tyre, and of balls; how soft they are."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from trajopt.robots.description import WheelSection
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.simulate import looks
-from trajopt.simulate.model import Joint, Link, Pose, Shape, cylinder, sphere
+from trajopt.simulate.model import Joint, Link, Model, Pose, Shape, cylinder, sphere
 from trajopt.simulate.rollers import disc_inertia
 
 # A castor's fork and a steered wheel's knuckle, of the wheel's mass; chosen.
 FORK_SHARE = 0.2
+# Tyres and rollers on smooth ground give way by this much under the robot's weight, m, at these
+# shares of critical damping, chosen: contacts that are equally soft share the load as the limits
+# assume. Hard rollers on four wheels leave two of them without load; at 0.8, those of turning wheels
+# carry 3/4 of a robot that moves diagonally, as each comes down on the ground at speed (measured).
+TYRE_SAG, TYRE_DAMPING, ROLLER_DAMPING = 0.002, 0.8, 0.2
 _ACROSS = Pose.along((0.0, 1.0, 0.0))
 
 
@@ -60,3 +67,14 @@ def fork(wheel: WheelSection, joint: Joint, parent: int) -> Link:
 def _spoke(wheel: WheelSection) -> Shape:
     """A bar across the wheel, so that pictures show how it has turned."""
     return Shape("box", (0.1 * wheel.radius, 0.51 * wheel.width, 0.9 * wheel.radius))
+
+
+def give(model: Model, link: Link) -> tuple[float, float] | None:
+    """Stiffness (N/m) and damping (N s/m) of what of a link touches smooth ground; None: hard."""
+    ball = link.wheel >= 0 and link.shapes[:1] and link.shapes[0].kind == "sphere"
+    if not (ball or link.joint.role == "roller"):
+        return None
+    load = model.mass / len(model.feet)
+    stiffness = load * STANDARD_GRAVITY / TYRE_SAG
+    share = ROLLER_DAMPING if link.joint.role == "roller" else TYRE_DAMPING
+    return stiffness, share * 2.0 * math.sqrt(stiffness * load)
