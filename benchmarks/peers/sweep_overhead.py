@@ -30,7 +30,8 @@ import numpy as np
 
 from benchmarks.common import ResultTable, publish
 from trajopt.sweeps.cases import Case
-from trajopt.sweeps.executors import Engine, dask_local, processes
+from trajopt.sweeps.dask_engines import dask_local
+from trajopt.sweeps.executors import Engine, processes
 from trajopt.sweeps.source import code_of
 from trajopt.sweeps.sweeps import missing, sweep, tabled
 
