@@ -45,7 +45,7 @@ def test_dask_lets_only_holders_of_a_certificate_in(tmp_path: Path) -> None:
         for tls in (other, None):
             with pytest.raises((OSError, TypeError, ValueError, RuntimeError)):
                 dask_at(address, tls=tls)
-        with pytest.raises(OSError, match="reset|Timed out"):
+        with pytest.raises(OSError, match=r"reset|Timed out"):
             distributed.Client(address.replace("tls", "tcp"), timeout="2s")
 
 
