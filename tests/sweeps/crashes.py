@@ -29,7 +29,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.sweeps.run_functions import paced
-from trajopt.sweeps.executors import Engine, dask_local, processes
+from trajopt.sweeps.dask_engines import dask_local
+from trajopt.sweeps.executors import Engine, processes
 from trajopt.sweeps.host import CaseLimits
 from trajopt.sweeps.rows import RUN_COLUMNS
 from trajopt.sweeps.slurm import SlurmOptions, submit

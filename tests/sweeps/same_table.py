@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tests.sweeps.crashes import cases, digest
 from tests.sweeps.run_functions import paced_mixed
-from trajopt.sweeps.executors import dask_local, dask_slurm
+from trajopt.sweeps.dask_engines import dask_local, dask_slurm
 from trajopt.sweeps.host import CaseLimits
 from trajopt.sweeps.slurm import SlurmOptions, submit
 from trajopt.sweeps.store import Store, open_store

@@ -26,8 +26,9 @@ from trajopt.errors import ArgumentError
 from trajopt.provenance import commit, versions
 from trajopt.sweeps.cases import Case
 from trajopt.sweeps.child import PROGRESS, note_progress, noted_progress
+from trajopt.sweeps.dask_engines import dask_local
 from trajopt.sweeps.drive import Progress
-from trajopt.sweeps.executors import Engine, WorkerStartError, dask_local
+from trajopt.sweeps.executors import Engine, WorkerStartError
 from trajopt.sweeps.store import StoreError, open_store
 from trajopt.sweeps.supervisor import RunLoadError
 from trajopt.sweeps.sweeps import sweep

@@ -52,6 +52,10 @@ EngineName = Annotated[
 Rerun = Annotated[bool, typer.Option("--rerun", help="run cases again whose rows other code made")]
 KeepOld = Annotated[bool, typer.Option("--keep-old", help="keep rows that other code made")]
 Host = Annotated[str, typer.Option(help="address at which Dask's servers listen")]
+Tls = Annotated[
+    Path | None,
+    typer.Option(help="folder with ca.pem, cert.pem, key.pem: Dask lets only their holders in"),
+]
 
 
 @app.command()
@@ -61,6 +65,7 @@ def run(
     workers: Workers = 0,
     engine: EngineName = "processes",
     host: Host = "127.0.0.1",
+    tls: Tls = None,
     rerun: Rerun = False,
     keep_old: KeepOld = False,
     dry_run: Annotated[
@@ -77,7 +82,7 @@ def run(
     _go(
         plan,
         store or _default_store(sweep_file),
-        _engine(engine, workers, host),
+        _engine(engine, workers, host, tls),
         retry_failed=False,
         old=old_rows(rerun, keep_old),
     )
@@ -90,6 +95,7 @@ def retry_failed(
     workers: Workers = 0,
     engine: EngineName = "processes",
     host: Host = "127.0.0.1",
+    tls: Tls = None,
     rerun: Rerun = False,
     keep_old: KeepOld = False,
 ) -> None:
@@ -99,7 +105,7 @@ def retry_failed(
     _go(
         load_sweep(sweep_file),
         store or _default_store(sweep_file),
-        _engine(engine, workers, host),
+        _engine(engine, workers, host, tls),
         retry_failed=True,
         old=old_rows(rerun, keep_old),
     )
@@ -422,19 +428,28 @@ def _default_store(sweep_file: Path) -> Path:
     return Path("out") / "sweeps" / sweep_file.stem
 
 
-def _engine(name: str, workers: int, host: str) -> Engine:
+def _engine(name: str, workers: int, host: str, tls: Path | None) -> Engine:
+    from trajopt.sweeps import dask_engines
     from trajopt.sweeps import executors as engines
+
+    if tls is not None and "dask" not in name and not name.startswith("tls://"):
+        raise ArgumentError(
+            "--tls", str(tls), "an engine of Dask: dask, dask-slurm or tls://host:port"
+        )
+    if host not in ("127.0.0.1", "::1", "localhost") and tls is None:
+        told = f"--host {host}: whoever reaches it can run code as you, as Dask asks no password; see --tls"
+        PlainConsole(stderr=True).print(f"warning: {told}")
 
     count = workers or engines.available_processors()
     if name == "processes":
         return engines.processes(count)
     if name == "dask":
-        return engines.dask_local(count, host=host)
+        return dask_engines.dask_local(count, host=host, tls=tls)
     if name == "dask-slurm":
-        return engines.dask_slurm(count, host=host)
+        return dask_engines.dask_slurm(count, host=host, tls=tls)
     if "://" in name:
-        return engines.dask_at(name)
-    raise ArgumentError("engine", name, "processes, dask, dask-slurm, or tcp://host:port")
+        return dask_engines.dask_at(name, tls=tls)
+    raise ArgumentError("engine", name, "processes, dask, dask-slurm, tcp:// or tls://host:port")
 
 
 @contextmanager

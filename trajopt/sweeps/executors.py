@@ -19,14 +19,10 @@ from dataclasses import dataclass
 from multiprocessing import get_context, resource_tracker
 from typing import Any
 
-from trajopt.errors import ArgumentError, MissingDependencyError, TrajoptError
+from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.sweeps.child import THREAD_VARIABLES, end_with_parent
 
-LOOPBACK = "127.0.0.1"
-# Starts in a row that may fail before an engine counts as broken. A Dask cluster takes seconds to
-# start, and the death of any of its processes meanwhile, from outside, spoils the whole start;
-# chosen: never seen in 300 random kills.
-_POOL_STARTS, _DASK_STARTS = 6, 12
+_POOL_STARTS = 6  # in a row that may fail before an engine counts as broken; chosen
 _GRACE = 5.0  # s an orphaned worker gets to store what it has; chosen
 
 
@@ -95,100 +91,6 @@ def processes(workers: int) -> Engine:
         )
 
     return Engine(f"{workers} processes", start, workers)
-
-
-def dask_local(workers: int, *, host: str = LOOPBACK) -> Engine:
-    """Engine of a Dask cluster on this machine."""
-    distributed = _distributed()
-
-    @contextmanager
-    def start() -> Iterator[Executor]:
-        # Memory is limited case by case; a worker that Dask ends for its memory would cost a whole
-        # chunk.
-        with (
-            _tries_once(),
-            distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host=host,
-                memory_limit=0,
-                silence_logs=40,
-                dashboard_address=None,
-                # The scheduler still answers HTTP: on any free port, not on a fixed one.
-                scheduler_kwargs={"dashboard_address": f"{host}:0"},
-            ) as cluster,
-            distributed.Client(cluster) as client,
-        ):
-            # Dask drops a worker that is down, even if only for a restart, some seconds after any
-            # death of it.
-            cluster.adapt(minimum=workers, maximum=workers, interval="1s")
-            yield client.get_executor(pure=False)
-
-    return Engine(f"Dask, {workers} local workers", start, workers, starts=_DASK_STARTS)
-
-
-def dask_at(address: str) -> Engine:
-    """Engine of a running Dask scheduler, such as "tcp://127.0.0.1:8786"."""
-    distributed = _distributed()
-    with distributed.Client(address, timeout="10s") as client:
-        workers = max(1, sum(client.nthreads().values()))
-
-    @contextmanager
-    def start() -> Iterator[Executor]:
-        with distributed.Client(address, timeout="10s") as client:
-            yield client.get_executor(pure=False)
-
-    return Engine(f"Dask at {address}", start, workers, starts=_DASK_STARTS)
-
-
-def dask_slurm(
-    jobs: int,
-    *,
-    memory: str = "2GB",
-    walltime: str = "01:00:00",
-    host: str = LOOPBACK,
-    queue: str | None = None,
-    directory: str | None = None,
-) -> Engine:
-    """Engine of Dask workers that Slurm starts, one a job, through dask-jobqueue.
-
-    ``host`` is the address at which scheduler and workers listen; a cluster of several nodes needs
-    one that the others reach. Jobs that end early are replaced.
-    """
-    try:
-        from dask_jobqueue.slurm import SLURMCluster
-    except ImportError:
-        raise MissingDependencyError("dask-jobqueue", "sweep", "Dask on Slurm") from None
-    distributed = _distributed()
-    prologue = [f"export {name}=1" for name in THREAD_VARIABLES]
-
-    @contextmanager
-    def start() -> Iterator[Executor]:
-        with (
-            _tries_once(),
-            SLURMCluster(
-                cores=1,
-                processes=1,
-                memory=memory,
-                walltime=walltime,
-                queue=queue,
-                log_directory=directory,
-                local_directory=directory,
-                job_script_prologue=prologue,
-                scheduler_options={
-                    "host": host,
-                    "dashboard": False,
-                    "dashboard_address": f"{host}:0",
-                },
-                worker_extra_args=["--host", host, "--no-dashboard"],
-            ) as cluster,
-        ):
-            cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs, interval="2s")
-            with distributed.Client(cluster) as client:
-                yield client.get_executor(pure=False)
-
-    return Engine(f"Dask, {jobs} Slurm jobs", start, jobs, starts=_DASK_STARTS)
 
 
 def available_processors() -> int:
@@ -284,22 +186,3 @@ def _width(executor: Executor) -> int:
             return found
     client: Any = getattr(executor, "_client", None)  # Dask's
     return available_processors() if client is None else max(1, sum(client.nthreads().values()))
-
-
-def _tries_once() -> AbstractContextManager[Any]:
-    """Setting for schedulers made inside: a dead worker's task comes back at once, since ``Drive``
-    tries again."""
-    import dask
-
-    settings: AbstractContextManager[Any] = dask.config.set(
-        {"distributed.scheduler.allowed-failures": 0}
-    )
-    return settings
-
-
-def _distributed() -> Any:
-    try:
-        import distributed
-    except ImportError:
-        raise MissingDependencyError("distributed", "sweep", "sweeps on Dask") from None
-    return distributed

@@ -51,7 +51,7 @@ def _from_npy(path: FilePath) -> Array:
         mapped = np.load(
             path, mmap_mode="r", allow_pickle=False
         )  # a huge file is refused before it is read
-    except (ValueError, EOFError, OSError) as error:
+    except Exception as error:  # a damaged header fails in many ways, in the tokenizer too
         raise ArgumentError(
             "ground.file", str(path), f"a .npy array of numbers ({error})"
         ) from error
@@ -67,7 +67,7 @@ def _from_npy(path: FilePath) -> Array:
 def _from_picture(path: FilePath) -> tuple[Array, bool]:
     """Values with row 0 at the lower edge, and whether they are metres (floats) or grey levels 0 to
     1."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         with Image.open(path) as picture:
@@ -78,6 +78,8 @@ def _from_picture(path: FilePath) -> tuple[Array, bool]:
             values = np.asarray(
                 picture if deep or metres else picture.convert("L"), dtype=np.float64
             )
-    except (UnidentifiedImageError, OSError, SyntaxError, Image.DecompressionBombError) as error:
+    except ArgumentError:
+        raise
+    except Exception as error:  # so do damaged pictures
         raise ArgumentError("ground.file", str(path), f"a readable picture ({error})") from error
     return values[::-1] / (1.0 if metres else 65535.0 if deep else 255.0), metres

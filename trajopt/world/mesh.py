@@ -105,10 +105,11 @@ class Mesh:
         from scipy.ndimage import distance_transform_edt
 
         low, high = self.vertices[:, :2].min(axis=0), self.vertices[:, :2].max(axis=0)
-        columns, rows = np.floor((high - low) / self.spacing + 1e-9).astype(int) + 1
-        if rows * columns > LARGEST_GRID:
+        cells = np.floor((high - low) / self.spacing + 1e-9) + 1
+        if not np.prod(cells) <= LARGEST_GRID:  # beyond all numbers, perhaps
             expected = f"a spacing that makes at most {LARGEST_GRID} points of the mesh"
             raise ArgumentError("ground.spacing", self.spacing, expected)
+        columns, rows = cells.astype(int)
         heights = np.full((rows, columns), -np.inf)
         for corners in self.vertices[self.faces]:
             _paint(heights, (corners - [*low, 0.0]) / [self.spacing, self.spacing, 1.0])
