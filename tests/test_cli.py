@@ -68,7 +68,7 @@ def test_a_solution_that_does_not_hold_exits_with_one():
         (("solve", SCENARIO, "--set", "limits"), "key=value"),
         (("solve", SCENARIO, "--optimizer", "magic"), "one of pso"),
         (("solve", SCENARIO, "--seed", "-1"), "whole number"),
-        (("solve", SCENARIO, "--seconds", "0"), "time > 0"),
+        (("solve", SCENARIO, "--seconds", "0"), "budget.seconds = 0.0"),
         (("solve", "problems/powerbot/experiment_1.toml", "--optimizer", "pso"), "not searched"),
         (("plan", SCENARIO), "[climb]"),
         (("validate", SCENARIO), "summary.json"),

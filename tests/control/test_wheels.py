@@ -13,7 +13,9 @@ from trajopt.robots import robot
 TWISTS = np.random.default_rng(5).uniform(-1.0, 1.0, (20, 3)) * [1.0, 0.5, 1.0]
 
 
-@pytest.mark.parametrize("name", ["loc8", "omni-3", "powerbot", "swerve", "asoc-4", "asoc-3", "car"])
+@pytest.mark.parametrize(
+    "name", ["loc8", "omni-3", "powerbot", "swerve", "asoc-4", "asoc-3", "car"]
+)
 def test_what_wheels_are_told_is_the_twist_that_they_measure(name: str) -> None:
     machine = robot(name)
     wheels, rng = WheelCommands(machine), np.random.default_rng(1)

@@ -185,6 +185,7 @@ def test_columns_of_the_trajectory_have_units(exact: Solution, tmp_path: Path) -
         "s_m",
         "s_dot_m_s",
         "s_ddot_m_s2",
+        "energy_j",
         "limit",
     ]
     assert not table.drop(columns="limit").isna().to_numpy().any()

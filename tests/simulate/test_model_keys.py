@@ -76,8 +76,14 @@ SECTIONS = {
     "double": DoubleSection, "pivots": PivotSection, "motors": MotorSection,
     "steering": SteeringSection,
 }  # fmt: skip
-# names of groups, and what bounds plans; physics has no acceleration limit of its own
-ELSEWHERE = {("motors", "name"), ("motors", "acceleration"), ("steering", "name")}
+# names of groups, and what bounds plans: physics follows them and limits speed and torque alone
+ELSEWHERE = {
+    *(
+        (("motors", key))
+        for key in ["name", "acceleration", "curve", "gear", "braking", "regeneration"]
+    ),
+    *((("steering", key)) for key in ["name", "rule", "rate", "acceleration"]),
+}
 
 
 @pytest.mark.parametrize(

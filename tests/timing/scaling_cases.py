@@ -9,6 +9,7 @@ from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot, robot
 
 NAN = float("nan")
+MOTOR = {"curve": [[0.0, 9.0], [60.0, 0.0]]}  # of a DC motor: stall torque, free speed
 
 
 def rear_cog_robot(friction_height: float = 0.215) -> Robot:
@@ -35,7 +36,7 @@ def rear_cog_robot(friction_height: float = 0.215) -> Robot:
                 "clearance": 0.1,
             },
             "wheels": wheels,
-            "motors": [{"name": "drives", "wheels": ["left", "right"], "torque": 9.0}],
+            "motors": [{"name": "drives", "wheels": ["left", "right"], "torque": 9.0} | MOTOR],
         }
     )
 
@@ -47,6 +48,8 @@ def robot_for(name: str, shape: str) -> Robot:
     """One that the limit ``name`` acts on and that drives the path ``shape``."""
     if name.startswith("steering"):
         return ROBOTS["swerve"]
+    if name in ("motor_curve", "wheel_torque") and shape in HOLONOMIC_ONLY:
+        return ROBOTS["loc8"].replace({"motors.all.curve": MOTOR["curve"]})
     return ROBOTS["loc8" if shape in HOLONOMIC_ONLY else "rear_cog"]
 
 
@@ -64,6 +67,8 @@ HOLONOMIC_ONLY = {"turning", "sideways"}
 ARGUMENTS: dict[str, dict[str, object]] = {
     "acceleration": {"forward": 0.7, "braking": 1.1},
     "contact": {},
+    "motor_curve": {},
+    "power": {"largest": 60.0},
     "slip": {"friction": 0.5},
     "speed": {"largest": 1.5},
     "speed_profile": {"places": (0.0, 0.5, 1.2), "speeds": (0.6, 1.0, 0.5)},
@@ -73,6 +78,7 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "tip": {},
     "wheel_acceleration": {"largest": 15.0},
     "wheel_speed": {"largest": 12.0},
+    "wheel_torque": {},
     "yaw_rate": {"largest": 0.9},
 }
 

@@ -13,13 +13,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, IndexArray, as_numbers
+from trajopt.arrays import Array, IndexArray, as_numbers, require_finite, require_positive
 from trajopt.errors import ArgumentError
-from trajopt.paths.spline import SplineBasis, chord_length_knots
+from trajopt.paths.points import default_knots, finite_numbers, lap
+from trajopt.paths.spline import SplineBasis
 
 _SETTLED = 1e-14  # of the length: what halving a quadrature cell may change; chosen
 _HALVINGS = 60  # of a quadrature cell at most: down to rounding
-_LARGEST = 1e7  # m (and rad): farther than any robot drives; squares of it keep nine digits of a metre. Chosen
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(8)
 
 
@@ -42,16 +42,14 @@ class Path:
             raise ArgumentError("basis", self.basis, "a SplineBasis")
         size = self.basis.size
         expected = f"numbers of shape ({size}, 2) or ({size}, 3)"
-        shape = np.shape(_numbers("coordinates", self.coordinates, expected))
+        shape = np.shape(finite_numbers("coordinates", self.coordinates, expected))
         if len(shape) != 2 or shape[0] != size or shape[1] not in (2, 3):
             raise ArgumentError("coordinates", shape, f"shape ({size}, 2) or ({size}, 3)")
         if self.heading is not None:
-            yaw = _numbers("heading", self.heading, f"angles of shape ({size},)")
+            yaw = finite_numbers("heading", self.heading, f"angles of shape ({size},)")
             if yaw.shape != (size,):
                 raise ArgumentError("heading", yaw.shape, f"shape ({size},)")
-        long = as_numbers("turning_length", self.turning_length, "a finite length > 0 m")
-        if long.ndim or not 0 < long < np.inf:
-            raise ArgumentError("turning_length", self.turning_length, "a finite length > 0 m")
+        require_positive("turning_length", self.turning_length, "m")
         if (
             self.heading is not None
             and shape[1] == 3
@@ -88,20 +86,20 @@ class Path:
         Raises ArgumentError for fewer than two points (a lap: three), neighbours that coincide, or
         numbers that are not finite.
         """
-        array = _numbers("points", points, "shape (N, 2) or (N, 3) with N >= 2")
+        array = finite_numbers("points", points, "shape (N, 2) or (N, 3) with N >= 2")
         if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] not in (2, 3):
             raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
         yaw = None
         if heading is not None:
-            yaw = _numbers("heading", heading, "one angle a point")
+            yaw = finite_numbers("heading", heading, "one angle a point")
             if yaw.shape != (len(array),):
                 raise ArgumentError(
                     "heading", yaw.shape, f"one angle a point, shape ({len(array)},)"
                 )
         if closed:
-            array, yaw = _lap(array, yaw)
+            array, yaw = lap(array, yaw)
         given = (
-            _default_knots(array, yaw, turning_length)
+            default_knots(array, yaw, turning_length)
             if knots is None
             else tuple(as_numbers("knots", knots, "increasing numbers").ravel().tolist())
         )
@@ -112,7 +110,7 @@ class Path:
         ends = []
         for name, end in (("start_direction", start_direction), ("end_direction", end_direction)):
             if end is not None:
-                ends.append(_numbers(name, end, f"{array.shape[1]} numbers"))
+                ends.append(finite_numbers(name, end, f"{array.shape[1]} numbers"))
                 if ends[-1].shape != (array.shape[1],):
                     raise ArgumentError(name, ends[-1].tolist(), f"{array.shape[1]} numbers")
         coordinates = np.vstack([array, *ends]) if ends else array
@@ -143,7 +141,7 @@ class Path:
 
     def position(self, u: ArrayLike, derivative: int = 0) -> Array:
         """(N, 3): x, y, z (m) or their derivative with respect to u, at spline parameters (N,)."""
-        value = self._evaluate(u, derivative)
+        value = self._evaluate(require_finite("u", u, shape=None), derivative)
         if self.heading is not None:
             value = value[:, :-1]
         return value if value.shape[1] == 3 else np.column_stack([value, np.zeros(len(value))])
@@ -188,7 +186,7 @@ class Path:
         The same function as ``basis.matrix(u, derivative) @ values``, in a tenth of the time for
         many points.
         """
-        if derivative not in (0, 1, 2, 3):
+        if type(derivative) is not int or not 0 <= derivative <= 3:
             raise ArgumentError("derivative", derivative, "an order from 0 to 3")
         knots, cubics = self._cubics
         u = np.atleast_1d(np.asarray(u, dtype=np.float64))
@@ -289,7 +287,7 @@ class Path:
 
     def parameter(self, u: ArrayLike) -> Array:
         """(N,): path parameter s at spline parameters u."""
-        u = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        u = np.atleast_1d(require_finite("u", u, shape=None))
         if self.plain:
             from trajopt.paths import arc
 
@@ -303,7 +301,7 @@ class Path:
         """(N,): spline parameter u at path parameters s in [0, length]: inverse cubic, then Newton
         on the arc length."""
         grid, table = self._table
-        s = np.clip(np.atleast_1d(np.asarray(s, dtype=np.float64)), 0.0, self.length)
+        s = np.clip(np.atleast_1d(require_finite("s", s, "m", None)), 0.0, self.length)
         if self.plain:
             from trajopt.paths import arc
 
@@ -320,32 +318,3 @@ class Path:
             if np.all(np.abs(residual) <= 1e-11 * width):  # the step just taken squares it
                 break
         return np.asarray(u)
-
-
-def _numbers(name: str, values: ArrayLike, expected: str) -> Array:
-    """``values`` as numbers that are finite and not beyond reach. Raises ArgumentError."""
-    array = as_numbers(name, values, expected)
-    if not np.all(np.abs(array) <= _LARGEST):  # NaN is refused too
-        raise ArgumentError(name, array.tolist(), f"finite numbers, at most {_LARGEST:g} in size")
-    return array
-
-
-def _default_knots(points: Array, yaw: Array | None, turning_length: float) -> tuple[float, ...]:
-    """Chord lengths, or with turns on the spot chord and turn together."""
-    if yaw is None or np.all(np.any(np.diff(points, axis=0) != 0, axis=1)):
-        return chord_length_knots(points)
-    length = as_numbers("turning_length", turning_length, "a finite length > 0 m")
-    return chord_length_knots(np.column_stack([points, length * yaw]))
-
-
-def _lap(points: Array, yaw: Array | None) -> tuple[Array, Array | None]:
-    """Points and headings that end as they began."""
-    if len(points) > 1 and np.array_equal(points[0], points[-1]):
-        points = points[:-1]
-        yaw = None if yaw is None else yaw[:-1]
-    if len(points) < 3:
-        raise ArgumentError("points", points.tolist(), "three or more points for a closed lap")
-    if yaw is not None:
-        turns = np.round((yaw[-1] - yaw[0]) / (2 * np.pi))
-        yaw = np.append(yaw, yaw[0] + 2 * np.pi * turns)
-    return np.vstack([points, points[:1]]), yaw

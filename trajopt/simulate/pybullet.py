@@ -97,7 +97,7 @@ class PyBullet:
                 fixedTimeStep=self.step,
                 numSolverIterations=self.solver_iterations,
                 # Bullet's cone lets the wheel of an axle that comes first hold all it can across,
-                # and then spin (measured: PowerBot along a slope turned by 40 deg): see Grip
+                # and then spin (measured: a differential drive along a slope turned by 40 deg): see Grip
                 enableConeFriction=0,
                 contactBreakingThreshold=self.contact_breaking_threshold,
                 erp=self.contact_erp,
