@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, IndexArray, as_numbers
+from trajopt.arrays import Array, IndexArray, as_numbers, require_finite, require_whole
 from trajopt.errors import ArgumentError
 from trajopt.paths.spline import SplineBasis, chord_length_knots
 
@@ -188,10 +188,9 @@ class Path:
         The same function as ``basis.matrix(u, derivative) @ values``, in a tenth of the time for
         many points.
         """
-        if derivative not in (0, 1, 2, 3):
-            raise ArgumentError("derivative", derivative, "an order from 0 to 3")
+        require_whole("derivative", derivative, 0, "an order from 0 to 3", 3)
         knots, cubics = self._cubics
-        u = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        u = _row("u", u)
         i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(cubics) - 1)
         t, c = (u - knots[i])[:, None], cubics[i]
         if derivative == 0:
@@ -289,7 +288,7 @@ class Path:
 
     def parameter(self, u: ArrayLike) -> Array:
         """(N,): path parameter s at spline parameters u."""
-        u = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        u = _row("u", u)
         if self.plain:
             from trajopt.paths import arc
 
@@ -303,7 +302,7 @@ class Path:
         """(N,): spline parameter u at path parameters s in [0, length]: inverse cubic, then Newton
         on the arc length."""
         grid, table = self._table
-        s = np.clip(np.atleast_1d(np.asarray(s, dtype=np.float64)), 0.0, self.length)
+        s = np.clip(_row("s", s), 0.0, self.length)
         if self.plain:
             from trajopt.paths import arc
 
@@ -327,6 +326,14 @@ def _numbers(name: str, values: ArrayLike, expected: str) -> Array:
     array = as_numbers(name, values, expected)
     if not np.all(np.abs(array) <= _LARGEST):  # NaN is refused too
         raise ArgumentError(name, array.tolist(), f"finite numbers, at most {_LARGEST:g} in size")
+    return array
+
+
+def _row(name: str, values: ArrayLike) -> Array:
+    """Finite numbers (N,), of one number too. Raises ArgumentError."""
+    array = np.atleast_1d(require_finite(name, values, "(N,)", None))
+    if array.ndim > 1:
+        raise ArgumentError(name, array.shape, "finite numbers (N,)")
     return array
 
 
