@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from tests.fuzz.mutants import ROOT
+from tests.fuzz.kinds import ROOT
 from trajopt.cli import app
 from trajopt.control.commands import compare_log
 from trajopt.errors import TrajoptError

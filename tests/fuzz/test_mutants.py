@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.mutants import ROOT, all_kinds, run
+from tests.fuzz.kinds import ROOT, all_kinds
+from tests.fuzz.mutants import run
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -13,7 +13,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, IndexArray, as_numbers, require_finite, require_positive
+from trajopt.arrays import (
+    Array,
+    IndexArray,
+    as_numbers,
+    require_finite,
+    require_positive,
+    require_whole,
+)
 from trajopt.errors import ArgumentError
 from trajopt.paths.points import default_knots, finite_numbers, lap
 from trajopt.paths.spline import SplineBasis
@@ -141,7 +148,7 @@ class Path:
 
     def position(self, u: ArrayLike, derivative: int = 0) -> Array:
         """(N, 3): x, y, z (m) or their derivative with respect to u, at spline parameters (N,)."""
-        value = self._evaluate(require_finite("u", u, shape=None), derivative)
+        value = self._evaluate(u, derivative)
         if self.heading is not None:
             value = value[:, :-1]
         return value if value.shape[1] == 3 else np.column_stack([value, np.zeros(len(value))])
@@ -186,10 +193,9 @@ class Path:
         The same function as ``basis.matrix(u, derivative) @ values``, in a tenth of the time for
         many points.
         """
-        if type(derivative) is not int or not 0 <= derivative <= 3:
-            raise ArgumentError("derivative", derivative, "an order from 0 to 3")
+        require_whole("derivative", derivative, 0, "an order from 0 to 3", 3)
         knots, cubics = self._cubics
-        u = np.atleast_1d(np.asarray(u, dtype=np.float64))
+        u = _row("u", u)
         i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(cubics) - 1)
         t, c = (u - knots[i])[:, None], cubics[i]
         if derivative == 0:
@@ -287,7 +293,7 @@ class Path:
 
     def parameter(self, u: ArrayLike) -> Array:
         """(N,): path parameter s at spline parameters u."""
-        u = np.atleast_1d(require_finite("u", u, shape=None))
+        u = _row("u", u)
         if self.plain:
             from trajopt.paths import arc
 
@@ -301,7 +307,7 @@ class Path:
         """(N,): spline parameter u at path parameters s in [0, length]: inverse cubic, then Newton
         on the arc length."""
         grid, table = self._table
-        s = np.clip(np.atleast_1d(require_finite("s", s, "m", None)), 0.0, self.length)
+        s = np.clip(_row("s", s), 0.0, self.length)
         if self.plain:
             from trajopt.paths import arc
 
@@ -318,3 +324,11 @@ class Path:
             if np.all(np.abs(residual) <= 1e-11 * width):  # the step just taken squares it
                 break
         return np.asarray(u)
+
+
+def _row(name: str, values: ArrayLike) -> Array:
+    """Finite numbers (N,), of one number too. Raises ArgumentError."""
+    array = np.atleast_1d(require_finite(name, values, "(N,)", None))
+    if array.ndim > 1:
+        raise ArgumentError(name, array.shape, "finite numbers (N,)")
+    return array

@@ -7,11 +7,13 @@ Lengths m, masses kg, torques N m at a wheel, angles rad.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
-from trajopt.arrays import require_whole
+from trajopt.arrays import require_finite, require_whole
 
 Tables = dict[str, Any]
+_POINTS = {"cog": (3,), "chassis": (3,), "chassis_place": (2,), "castor": (2,)}  # shapes
 MECANUM_ANGLES = (-math.pi / 4, math.pi / 4, math.pi / 4, -math.pi / 4)  # rad: FL, FR, RL, RR
 CORNERS = (
     ("front-left", 1, 1),
@@ -19,6 +21,15 @@ CORNERS = (
     ("rear-left", -1, 1),
     ("rear-right", -1, -1),
 )
+
+
+def tables(builder: str, sizes: Mapping[str, Any]) -> Tables:
+    """Tables of the builder called so. Raises ArgumentError for sizes that are no numbers."""
+    for name, value in sizes.items():
+        if name != "name":
+            require_finite(f"{builder}.{name}", value, "", _POINTS.get(name, ()))
+    made: Tables = globals()[builder](**sizes)
+    return made
 
 
 def differential(

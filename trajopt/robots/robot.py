@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from trajopt.arrays import Array, require_finite
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.robots.description import RobotDescription, WheelSection
 from trajopt.robots.wheel import Row, Wheel, WheelKind, kinematic, null_space, outline, wheel_rates
@@ -269,27 +269,27 @@ class Robot:
     @classmethod
     def differential(cls, **sizes: Any) -> Robot:
         """Two driven wheels on one axle and a free castor; see ``builders.differential``."""
-        return cls.of(_built("differential", sizes))
+        return cls.of(_builders().tables("differential", sizes))
 
     @classmethod
     def car(cls, **sizes: Any) -> Robot:
         """Two fixed rear wheels, two steered front wheels; see ``builders.car``."""
-        return cls.of(_built("car", sizes))
+        return cls.of(_builders().tables("car", sizes))
 
     @classmethod
     def mecanum(cls, **sizes: Any) -> Robot:
         """Four Mecanum wheels; see ``builders.mecanum``."""
-        return cls.of(_built("mecanum", sizes))
+        return cls.of(_builders().tables("mecanum", sizes))
 
     @classmethod
     def omni(cls, **sizes: Any) -> Robot:
         """Omni wheels evenly around the centre; see ``builders.omni``."""
-        return cls.of(_built("omni", sizes))
+        return cls.of(_builders().tables("omni", sizes))
 
     @classmethod
     def swerve(cls, **sizes: Any) -> Robot:
         """Four driven, steered wheels; see ``builders.swerve``."""
-        return cls.of(_built("swerve", sizes))
+        return cls.of(_builders().tables("swerve", sizes))
 
 
 def robot(name: str, overrides: Mapping[str, Any] | None = None) -> Robot:
@@ -313,13 +313,7 @@ def robot_names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in DATA.glob("*.toml")))
 
 
-def _built(builder: str, sizes: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables of a builder. Raises ArgumentError for sizes that are no numbers."""
+def _builders() -> Any:
     from trajopt.robots import builders
 
-    for name, value in sizes.items():
-        if name != "name":
-            points = {"cog": (3,), "chassis": (3,), "chassis_place": (2,), "castor": (2,)}
-            require_finite(f"{builder}.{name}", value, "", points.get(name, ()))
-    tables: dict[str, Any] = getattr(builders, builder)(**sizes)
-    return tables
+    return builders
