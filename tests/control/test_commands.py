@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -42,7 +43,7 @@ def test_drive_of_a_circle_is_exact(plan: Trajectory) -> None:
     """Constant wheel speeds make a circle, whatever the sampling."""
     orders = commands(plan, 0.5)
     speeds = np.tile([0.3, 0.5], (len(orders.times), 1))
-    circle = type(orders)(orders.times, speeds, orders.wheels, 0.5)
+    circle = replace(orders, speeds=speeds)
     t = np.linspace(0, circle.duration, 33)
     pose = driven(circle, shipped("powerbot"), (1.0, 2.0, 0.3), t)
     w, v = 0.2 / (2 * 0.268), 0.4

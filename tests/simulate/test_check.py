@@ -179,8 +179,6 @@ def test_what_cannot_be_checked_is_refused_by_name() -> None:
         validate(time_scale(Path.through([[0, 0], [1, 0]]), LIMITS), FLAT)
     with pytest.raises(ArgumentError, match="engine"):
         validate(plan, FLAT, engine="bullet")
-    with pytest.raises(ArgumentError, match="without steering"):
-        validate(straight(robot("car")), FLAT, control="pose")
     small = Scene(0.8, HeightMap(np.zeros((9, 9)), 0.25, (-1.0, -1.0)))
     with pytest.raises(SimulationError, match="take a larger map"):
         validate(plan, small)

@@ -111,6 +111,7 @@ def seen(**changes: object) -> Observation:
         swivels=np.zeros(0),
         loads=np.zeros(4),
         slip=np.zeros(4),
+        spin_angles=np.zeros(4),
         contacts=4,
         penetration=1e-4,
         hits=(),

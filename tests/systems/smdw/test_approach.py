@@ -46,7 +46,7 @@ def test_odometry_follows_the_plan(plan: Plan) -> None:
     reference = reference_of(plan.trajectory, np.zeros(4))
     estimate = Estimate(reference.pose[0], np.zeros((3, 3)))
     for before, after in zip(reference.wheels[:-1], reference.wheels[1:], strict=True):
-        estimate = predict(estimate, ROBOT, after - before)
+        estimate = predict(estimate, ROBOT, ROBOT.forward @ (after - before))
     assert estimate.pose == pytest.approx(reference.pose[-1], abs=2e-3)
     assert np.linalg.eigvalsh(estimate.covariance).min() > 0
 
@@ -62,7 +62,9 @@ def test_doubt_of_the_yaw_becomes_doubt_of_the_place_as_poses_differ(
     root = np.array([[0.02, 0.0, 0.0], [0.01, 0.03, 0.0], [0.005, -0.01, 0.04]])
 
     def moved(pose: np.ndarray, covariance: np.ndarray) -> Estimate:
-        return predict(Estimate(pose, covariance), ROBOT, np.array(turned, dtype=float))
+        return predict(
+            Estimate(pose, covariance), ROBOT, ROBOT.forward @ np.array(turned, dtype=float)
+        )
 
     slope = np.stack(
         [
@@ -84,7 +86,7 @@ def test_a_place_measured_later_corrects_the_yaw_to_the_right_side() -> None:
     estimate = Estimate(np.zeros(3), np.diag([1e-4, 1e-4, 0.1]) ** 2)
     wheel = 2.0 / 0.098 / 20
     for _ in range(20):
-        estimate = predict(estimate, ROBOT, np.full(4, wheel))
+        estimate = predict(estimate, ROBOT, ROBOT.forward @ np.full(4, wheel))
     assert estimate.pose == pytest.approx([2.0, 0.0, 0.0], abs=1e-9)
     doubt = np.array([2.0, 0.1, 0.0])  # yaw as good as unmeasured
     found = correct(estimate, doubt, np.array([0.001, 0.001, 10.0]))
@@ -155,7 +157,7 @@ def test_kinematic_closed_loop_removes_start_errors(plan: Plan) -> None:
     truth, wheels, dt = control.reference.pose[0] + [0.01, -0.01, 0.017], np.zeros(4), 0.01
     for k in range(round((plan.duration + 1.0) / dt)):
         turned = control.step(k * dt, told(k, truth, wheels)).wheel_speeds * dt
-        truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, turned).pose
+        truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, ROBOT.forward @ turned).pose
         wheels = wheels + turned
     assert truth == pytest.approx(control.goal.pose, abs=2e-3)
     assert np.abs((wheels - control.goal.wheels)[list(control.goal.critical)]).max() < 0.03
@@ -241,7 +243,7 @@ def test_an_error_at_rest_is_shared_between_pose_and_phase_on_the_spot(plan: Pla
         control._next_solve = start * dt  # on the way nothing is corrected
         for k in range(start, start + 130):
             turned = control.step(k * dt, told(k, truth, wheels)).wheel_speeds * dt
-            truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, turned).pose
+            truth = predict(Estimate(truth, np.zeros((3, 3))), ROBOT, ROBOT.forward @ turned).pose
             wheels = wheels + turned
         left[mode] = (
             float(np.hypot(*(truth - control.goal.pose)[:2])),
