@@ -204,6 +204,12 @@ def test_one_angle_tells_those_of_all_wheels_steered_with_it() -> None:
     for given in ({0: left}, {1: right}, {0: left, 1: right}):
         np.testing.assert_allclose(given_angles(steering, given), [left, right, middle], atol=1e-9)
     assert np.isnan(given_angles(steering, {})).all()
+    endless = steering_of(CAR.replace({"steering.front.range": None}))
+    sharp = np.arctan(base / np.array([-0.2 - half, -0.2 + half, -0.2])) - np.pi
+    np.testing.assert_allclose(given_angles(endless, {0: sharp[0]}), sharp, atol=1e-9)
+    tricycle = steering_of(robot("tricycle"))
+    for end in (-1.3, 1.3):  # ends of the range belong to it
+        np.testing.assert_allclose(given_angles(tricycle, {0: end}), end, atol=1e-12)
     parallel = steering_of(CAR.replace({"steering.front.rule": "parallel"}))
     np.testing.assert_allclose(given_angles(parallel, {1: 0.2}), [0.2, 0.2, 0.2], atol=1e-12)
     pair = SWERVE.description.model_dump(mode="json", exclude_none=True)
