@@ -232,6 +232,11 @@ def test_angles_count_from_the_rolling_direction_of_the_file() -> None:
     here = [on.samples(s, path.locate(s)).wheels for on in found]
     np.testing.assert_allclose(here[1].steering, here[0].steering - off, atol=1e-12)
     np.testing.assert_allclose(here[1].spin, here[0].spin, atol=1e-12)
+    askew = POWERBOT.replace({f"wheels.{CASTOR}.angle": 0.7})
+    bend, s = Path.through([[0, 0], [0.5, 0.2], [1, 0]]), np.linspace(0, 1, 7)
+    plain = steering_at(track(bend, POWERBOT, start_steering={CASTOR: 0.3}), s)[:, AT]
+    found_too = steering_at(track(bend, askew, start_steering={CASTOR: -0.4}), s)[:, AT]
+    np.testing.assert_allclose(found_too, plain - 0.7, atol=1e-7)
     # car: one wheel's angle, told from its own zero, tells that of its pair and of the middle
     car = steering_of(
         CAR.replace({"wheels.front-left.angle": 0.3, "wheels.front-right.angle": 0.3})
