@@ -204,6 +204,12 @@ def test_one_angle_tells_those_of_all_wheels_steered_with_it() -> None:
     for given in ({0: left}, {1: right}, {0: left, 1: right}):
         np.testing.assert_allclose(given_angles(steering, given), [left, right, middle], atol=1e-9)
     assert np.isnan(given_angles(steering, {})).all()
+    endless = steering_of(CAR.replace({"steering.front.range": None}))
+    sharp = np.arctan(base / np.array([-0.2 - half, -0.2 + half, -0.2])) - np.pi
+    np.testing.assert_allclose(given_angles(endless, {0: sharp[0]}), sharp, atol=1e-9)
+    tricycle = steering_of(robot("tricycle"))
+    for end in (-1.3, 1.3):  # ends of the range belong to it
+        np.testing.assert_allclose(given_angles(tricycle, {0: end}), end, atol=1e-12)
     parallel = steering_of(CAR.replace({"steering.front.rule": "parallel"}))
     np.testing.assert_allclose(given_angles(parallel, {1: 0.2}), [0.2, 0.2, 0.2], atol=1e-12)
     pair = SWERVE.description.model_dump(mode="json", exclude_none=True)
@@ -226,6 +232,11 @@ def test_angles_count_from_the_rolling_direction_of_the_file() -> None:
     here = [on.samples(s, path.locate(s)).wheels for on in found]
     np.testing.assert_allclose(here[1].steering, here[0].steering - off, atol=1e-12)
     np.testing.assert_allclose(here[1].spin, here[0].spin, atol=1e-12)
+    askew = POWERBOT.replace({f"wheels.{CASTOR}.angle": 0.7})
+    bend, s = Path.through([[0, 0], [0.5, 0.2], [1, 0]]), np.linspace(0, 1, 7)
+    plain = steering_at(track(bend, POWERBOT, start_steering={CASTOR: 0.3}), s)[:, AT]
+    found_too = steering_at(track(bend, askew, start_steering={CASTOR: -0.4}), s)[:, AT]
+    np.testing.assert_allclose(found_too, plain - 0.7, atol=1e-7)
     # car: one wheel's angle, told from its own zero, tells that of its pair and of the middle
     car = steering_of(
         CAR.replace({"wheels.front-left.angle": 0.3, "wheels.front-right.angle": 0.3})

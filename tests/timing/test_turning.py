@@ -144,6 +144,17 @@ def test_a_steering_rate_that_binds_makes_a_car_slower_and_says_so() -> None:
     for found, name in ((rate, "steering_rate"), (bent, "steering_acceleration")):
         assert name in {stretch.limit for stretch in found.active}
         assert found.margins()[name] >= -1e-9
+    mirrored = Path.through(BEND.points * [1.0, -1.0])
+    same = time_scale(mirrored, [*PACE, SteeringAcceleration(0.03)], robot=CAR)
+    assert same.duration == pytest.approx(bent.duration, rel=1e-9)
+    along = time_scale(BEND, [*PACE, SteeringAcceleration(0.03)], robot=CAR)
+    time = np.linspace(0, along.duration, 3001)[1:-1]
+    middle = np.arctan(BASE * along.at(time).twist[:, 2] / along.at(time).twist[:, 0])
+    push = np.gradient(np.gradient(middle, time), time)
+    knots = along.times[np.searchsorted(along.u, BEND.basis.knots)]
+    far = np.abs(time[:, None] - knots).min(axis=1) > 0.02
+    assert push[far].max() == pytest.approx(0.03, rel=5e-3)
+    assert push[far].min() == pytest.approx(-0.03, rel=5e-3)
     time = np.linspace(0, rate.duration, 3001)[1:-1]
     # the group's angle is that of a wheel in the middle
     middle = np.arctan(BASE * rate.at(time).twist[:, 2] / rate.at(time).twist[:, 0])
