@@ -27,10 +27,10 @@ READERS: tuple[Callable[[Any], Any], ...] = (load_problem, load_sweep, Robot.loa
 
 def told(call: Callable[..., Any], *arguments: Any) -> str:
     """What the error says, in one line and soon."""
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(TrajoptError) as error:
         call(*arguments)
-    assert time.perf_counter() - started < 2.0
+    assert time.process_time() - started < 2.0
     text = str(error.value)
     assert text.isprintable()
     assert len(text) < 1000

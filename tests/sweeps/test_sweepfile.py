@@ -82,10 +82,10 @@ AXES = "[axes.x]\nvalues = [1, 2]\n"
 def test_every_line_of_a_sweep_file_is_checked(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "sweep.toml"
     file.write_text(text if "run = " in text else RUN + text)
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(ProblemError, match=words) as told:
         load_sweep(file)
-    assert time.perf_counter() - started < 2.0
+    assert time.process_time() - started < 2.0
     assert str(told.value).startswith(f"{file}: ")
     assert "\n" not in str(told.value)
     assert len(str(told.value)) < 1000
