@@ -13,6 +13,7 @@ from trajopt.bench.profiles import holm
 from trajopt.bench.tables import GRADIENT_METHODS, NEAR, SOLVED, BenchTables, Share
 from trajopt.files import whole_file
 from trajopt.report.files import markdown
+from trajopt.report.viewer.bench_page import write_bench_page
 from trajopt.sweeps.store import Store
 
 _LEVEL = 0.05  # of significance
@@ -21,8 +22,8 @@ _PEERS = ("pyswarms", "pyswarms-constriction", "pyswarms-equal", "pymoo-pso")
 
 
 def write_report(store: Store, out: Path) -> Path:
-    """Write index.md, the CSV tables and the figures of a benchmark's rows into ``out``; index.md's
-    path."""
+    """Write index.md, a page of all of it (index.html), the CSV tables and the figures of a
+    benchmark's rows into ``out``; index.md's path."""
     out.mkdir(parents=True, exist_ok=True)
     tables = BenchTables(store.frame().to_dict("records"))
     figures = save_bench_pictures(tables, out)
@@ -34,13 +35,16 @@ def write_report(store: Store, out: Path) -> Path:
     sections = {
         "Answers": answer_lines(tables),
         "Share of searches solved": [*share_lines(tables, out), "", curves],
-        **{title: [f"![{title}]({file})"] for title, file in figures.items()},
+        **{title: [f"![{title}]({file})"] for title, (file, _) in figures.items()},
         "Expected running time": _running_table(tables, out),
         "Construction": _construction(tables, out),
         "PSO against pyswarms": peer_lines(tables),
         "Best known costs": markdown(("problem", "best cost", "found by"), best),
         "Searches that failed": _failures(tables),
     }
+    write_bench_page(
+        out / "index.html", run_line(store, tables), [f for _, f in figures.values()], sections
+    )
     text = ["# Optimizers compared", "", run_line(store, tables)]
     for title, lines in sections.items():
         text += ["", f"## {title}", "", *lines]

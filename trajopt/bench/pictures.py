@@ -49,21 +49,23 @@ PROFILE_SHARE = (
 )
 
 
-def save_bench_pictures(tables: BenchTables, out: Path) -> dict[str, str]:
-    """Draw the figures of a benchmark as PNG and SVG into ``out``: title -> name of the PNG."""
+def save_bench_pictures(tables: BenchTables, out: Path) -> dict[str, tuple[str, Figure]]:
+    """Draw the figures of a benchmark as PNG and SVG into ``out``: title -> name of the PNG, figure."""
     accuracy = f"(accuracy {PROFILE_SHARE:g})"
     drawn = {
         "Targets reached (ECDF over problems, seeds and targets)": ("ecdf", _ecdf_figure),
         f"Data and performance profiles {accuracy}": ("profiles", _profile_figure),
         "Targets reached over time, family by family": ("families", _family_figure),
     }
+    found = {}
     with in_style():
-        for name, draw in drawn.values():
+        for title, (name, draw) in drawn.items():
             figure = draw(tables)
+            found[title] = (f"{name}.png", figure)
             for kind in ("svg", "png"):
                 with whole_file(out / f"{name}.{kind}") as part:
                     figure.savefig(part, format=kind)
-    return {title: f"{name}.png" for title, (name, _) in drawn.items()}
+    return found
 
 
 def _ecdf_figure(tables: BenchTables) -> Figure:
@@ -128,7 +130,7 @@ def _family_figure(tables: BenchTables) -> Figure:
         curves = ecdf(part, budgets)
         for i, k in enumerate(chosen):
             name = tables.optimizers[k]
-            _steps(axes, budgets, curves[:, i], _SHOWN.index(name), name)
+            _steps(axes, budgets, curves[:, i], k, name)
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             named.setdefault(label, handle)
     for axes in grid[len(families) :]:

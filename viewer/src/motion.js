@@ -37,7 +37,7 @@ scene.fog = new Fog("#e9eef3", 14, 40);
 const sun = new DirectionalLight("#fff6e8", 2.2);
 scene.add(new HemisphereLight("#ffffff", "#b9c0c8", 2.0), sun, sun.target);
 
-const surroundings = sceneOf(data.scene, fine ? renderer.capabilities.getMaxAnisotropy() : 2);
+const surroundings = sceneOf(data.scene, fine);
 scene.add(surroundings.group);
 const model = new Model(data.robot);
 const solid = data.motions.length - 1; // the last motion is the subject, earlier ones are hinted at
@@ -90,7 +90,7 @@ function show(time) {
 }
 
 const plots = data.plots.map((plot) => new Plot(byId("plots"), plot, duration, (t) => player.set(t)));
-if (!plots.length) byId("plots").remove();
+if (!plots.length) document.querySelector("main").classList.add("bare");
 const player = new Player(duration, show);
 
 function resize() {
@@ -156,6 +156,7 @@ player.start();
 // What tests and recorders use.
 window.view = {
   data, duration, player,
+  opened: performance.now() / 1000, // s from the start of loading until all was built
   frame: (time) => { player.set(time); player.draw(); },
   look: (name) => Array.from(byId("cameras").children).find((button) => button.textContent === name).click(),
   // of a link by name, read from the scene

@@ -22,7 +22,7 @@ export class Model {
     this.count = data.parents.length;
     this.rest = data.parents.map((_, i) => poseMatrix(data.rest, i));
     this.axes = data.parents.map((_, i) => new Vector3(...data.axes.subarray(3 * i, 3 * i + 3)));
-    this.geometries = data.shapes.map(geometryOf);
+    this.geometries = data.shapes.map((shape) => geometryOf(shape, this.count));
     this.looks = data.looks.map(([link, shape, order], i) => ({
       link, shape, pose: poseMatrix(data.poses, i), colour: this.colourOf(i, order),
     }));

@@ -1,7 +1,7 @@
 // The ground and what stands on it.
 import {
   BufferAttribute, BufferGeometry, CanvasTexture, Color, DoubleSide, EdgesGeometry, ExtrudeGeometry, Group, LineBasicMaterial,
-  LineSegments, Mesh, MeshLambertMaterial, PlaneGeometry, RepeatWrapping, Shape, SRGBColorSpace, Vector2,
+  LineSegments, Mesh, MeshBasicMaterial, MeshLambertMaterial, PlaneGeometry, RepeatWrapping, Shape, SRGBColorSpace, Vector2,
 } from "three";
 
 const BEYOND = 12; // m that level ground goes on around the motion
@@ -80,10 +80,12 @@ function thing({ name, kind, outline, low, high }) {
   return mesh;
 }
 
-export function sceneOf(data, anisotropy) {
+// `fine`: with shadows, and textures sharp at a slant.
+export function sceneOf(data, fine) {
   const group = new Group();
   const geometry = data.ground ? surface(data.ground) : level(data);
-  const material = new MeshLambertMaterial({ map: grid(anisotropy), side: DoubleSide, vertexColors: Boolean(data.ground) });
+  const Material = fine || data.ground ? MeshLambertMaterial : MeshBasicMaterial;
+  const material = new Material({ map: grid(fine ? 8 : 1), side: DoubleSide, vertexColors: Boolean(data.ground) });
   const ground = new Mesh(geometry, material);
   ground.name = "ground";
   ground.receiveShadow = true;

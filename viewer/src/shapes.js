@@ -3,7 +3,7 @@ import {
   BoxGeometry, BufferAttribute, BufferGeometry, CylinderGeometry, LatheGeometry, SphereGeometry, Vector2,
 } from "three";
 
-const SIDES = 10; // of a roller
+const MANY = 300; // rollers from which on each is drawn with fewer faces
 const ROUND = 28; // sides of a wheel
 
 function hull({ corners, faces }) {
@@ -23,21 +23,26 @@ function hull({ corners, faces }) {
   return found;
 }
 
-// Rings (radius, height) about z, closed at both ends.
-function lathe({ rings }) {
-  const points = [new Vector2(0, rings[1])];
-  for (let i = 0; i < rings.length; i += 2) points.push(new Vector2(rings[i], rings[i + 1]));
-  points.push(new Vector2(0, rings[rings.length - 1]));
-  return new LatheGeometry(points, SIDES).rotateX(Math.PI / 2);
+// Rings (radius, height) about z, closed at both ends; of many only the first, the thickest and the last.
+function lathe({ rings }, count) {
+  const last = rings.length / 2 - 1, ring = (i) => new Vector2(rings[2 * i], rings[2 * i + 1]);
+  if (count > MANY) {
+    const points = [0, Math.round(last / 2), last].map(ring);
+    return new LatheGeometry(points, 5).rotateX(Math.PI / 2);
+  }
+  const points = Array.from({ length: last + 1 }, (_, i) => ring(i));
+  const [low, high] = [0, last].map((i) => new Vector2(0, rings[2 * i + 1]));
+  return new LatheGeometry([low, ...points, high], 10).rotateX(Math.PI / 2);
 }
 
 // The geometry of a shape in its own frame: cylinders and lathes about z, as physics has them.
-export function geometryOf(shape) {
+// `count`: how many bodies the robot has.
+export function geometryOf(shape, count) {
   const [x, y, z] = shape.size ?? [];
   switch (shape.kind) {
     case "box": return new BoxGeometry(2 * x, 2 * y, 2 * z);
     case "cylinder": return new CylinderGeometry(x, x, 2 * z, ROUND).rotateX(Math.PI / 2);
-    case "lathe": return lathe(shape);
+    case "lathe": return lathe(shape, count);
     case "hull": return hull(shape);
     default: return new SphereGeometry(1, 18, 12).scale(x, y, z); // sphere, ellipsoid
   }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from trajopt.report.viewer.rollers import rim_velocity, rollers_data, sliding_ve
 from trajopt.robots.robot import Robot
 from trajopt.simulate.build import build
 from trajopt.timing.trajectory import Trajectory
+if TYPE_CHECKING:
+    from trajopt.simulate.engine import Recording
 
 STEP = 0.01  # s between samples, chosen: a wheel that accelerates by 80 rad/s^2 is 1e-3 rad off between them
 MOST = 1500  # samples of a motion; longer ones are thinned, chosen
@@ -48,6 +50,24 @@ def planned(trajectory: Trajectory, name: str = "planned") -> Motion:
         name, times, state.position, state.rotation, state.twist, state.spin_angles,
         state.spin_rates, state.steering_angles, state.steering_rates,
     )  # fmt: skip
+
+
+def recorded_columns(recording: Recording, robot: Robot) -> dict[str, Array]:
+    """The columns of ``simulated.csv`` that a page needs."""
+    x, y, yaw = recording.pose.T
+    table = {"t_s": recording.times, "x_m": x, "y_m": y, "z_m": recording.height, "yaw_rad": yaw}
+    table |= {"roll_rad": recording.roll, "pitch_rad": recording.pitch}
+    steering = build(robot).steering(recording.angles, recording.swivels)
+    every = [wheel.name for wheel in robot.description.wheels]
+    for quantity, values, names in (
+        ("angle_rad", recording.wheel_angles, robot.wheel_names),
+        ("speed_rad_s", recording.wheel_speeds, robot.wheel_names),
+        ("steering_rad", steering, every),
+        ("load_n", recording.loads, every),
+        ("slip_m_s", recording.slip, every),
+    ):
+        table |= {column(names[k], quantity): values[:, k] for k in range(len(names))}
+    return table
 
 
 def simulated(table: Mapping[str, Array], robot: Robot, name: str) -> Motion:

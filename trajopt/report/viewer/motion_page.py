@@ -45,16 +45,22 @@ def write_view(solution: Solution, folder: FilePath) -> FilePath | None:
         )
         hits = facts["contacts"]
         about += f"; in {facts['engine']} {1e3 * facts['final_distance_m']:.1f} mm off at the end"
-    data = view_data(robot, solution.problem.scene, motions, solution.problem.title, about)
+    problem = solution.problem
+    data = view_data(robot, problem.scene, motions, problem.title, about, trajectory)
     data["hits"] = hits
-    data["plots"] = _plots(trajectory, motions, robot)
     return write_page("motion", data, folder / VIEW)
 
 
 def view_data(
-    robot: Robot, scene: Scene, motions: Sequence[Motion], title: str, about: str
+    robot: Robot,
+    scene: Scene,
+    motions: Sequence[Motion],
+    title: str,
+    about: str,
+    trajectory: Trajectory | None = None,
 ) -> dict[str, Any]:
-    """What the page shows of motions of one robot in one scene, without plots."""
+    """What the page shows of motions of one robot in one scene; with the ``trajectory`` that the
+    first one is, curves too."""
     places = np.vstack([motion.place[:, :2] for motion in motions])
     return {
         "title": title,
@@ -63,7 +69,7 @@ def view_data(
         "scene": scene_data(scene, places),
         "motions": [motion_data(motion, robot) for motion in motions],
         "hits": [],
-        "plots": [],
+        "plots": [] if trajectory is None else _plots(trajectory, motions, robot),
     }
 
 

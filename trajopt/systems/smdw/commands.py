@@ -122,6 +122,7 @@ def climb(
         climb_trials_table,
         save_climb_trials_picture,
         write_climb_trials,
+        write_trial_page,
     )
     from trajopt.systems.smdw.trials import climb_trials
 
@@ -171,6 +172,7 @@ def climb(
     if out is not None:
         if pictures:
             save_climb_trials_picture(done, found.problem, chosen, out)
+            write_trial_page(done, found.problem, chosen, out)
         console.print(f"written to {out}", soft_wrap=True)
 
 

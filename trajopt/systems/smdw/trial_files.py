@@ -18,6 +18,7 @@ from trajopt.problem import Problem
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import made_folder, write_json, write_text
 from trajopt.report.intervals import wilson
+from trajopt.report.viewer.motion import STEP, planned, recorded_columns, simulated
 from trajopt.systems.smdw.entry import step_of
 from trajopt.systems.smdw.planner import Plan
 from trajopt.systems.smdw.trials import ClimbTrial
@@ -140,6 +141,30 @@ def save_climb_trials_picture(
         return save_figure(
             motions_figure(panels, problem.robot, columns=2), made_folder(folder) / "trials.png"
         )
+
+
+def write_trial_page(
+    trials: Sequence[ClimbTrial], problem: Problem, plan: Plan, folder: FilePath
+) -> FilePath | None:
+    """Write view.html of the first trial that stayed in physics: the plan, and the approach with
+    the climb after it. None where no trial did."""
+    from trajopt.report.viewer.motion_page import VIEW, view_data
+    from trajopt.report.viewer.pages import write_page
+
+    trial = next((t for t in trials if t.climb is not None and not t.exploded), None)
+    if trial is None or trial.climb is None or trial.outcome is None:
+        return None
+    first, then = (recorded_columns(r, problem.robot) for r in (trial.approach, trial.climb))
+    then["t_s"] = then["t_s"] + first["t_s"][-1] + STEP
+    table = {name: np.concatenate([first[name], then[name]]) for name in first}
+    driven = simulated(table, problem.robot, f"simulated ({trial.approach.engine})")
+    ending = "critical wheels up" if trial.outcome.critical_up else trial.outcome.reason
+    data = view_data(
+        problem.robot, problem.scene, [planned(plan.trajectory), driven], problem.title,
+        f"{plan.configuration.name}, trial {trial.number}, friction {trial.friction:.2f}: {ending}",
+        plan.trajectory,
+    )  # fmt: skip
+    return write_page("motion", data, made_folder(folder) / VIEW)
 
 
 def _turned(pose: Array, direction: float) -> Array:
