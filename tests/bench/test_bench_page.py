@@ -22,7 +22,8 @@ def test_every_curve_and_table_is_there(tmp_path: Path) -> None:
         charts = page.evaluate("view.data.charts.map(c => c.lines.map(l => [l.name, l.colour]))")
         assert len(charts) >= 6
         assert all(
-            len({colour for n, colour in sum(charts, []) if n == name}) == 1 for name in NAMES
+            len({colour for chart in charts for n, colour in chart if n == name}) == 1
+            for name in NAMES
         )
         assert page.locator("#charts canvas").count() == len(charts)
         markdown = report.read_text()

@@ -16,6 +16,7 @@ from trajopt.report.viewer.rollers import rim_velocity, rollers_data, sliding_ve
 from trajopt.robots.robot import Robot
 from trajopt.simulate.build import build
 from trajopt.timing.trajectory import Trajectory
+
 if TYPE_CHECKING:
     from trajopt.simulate.engine import Recording
 
