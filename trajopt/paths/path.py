@@ -13,14 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import (
-    Array,
-    IndexArray,
-    as_numbers,
-    require_finite,
-    require_positive,
-    require_whole,
-)
+from trajopt import arrays
+from trajopt.arrays import Array, IndexArray, as_numbers, require_finite
 from trajopt.errors import ArgumentError
 from trajopt.paths.points import default_knots, finite_numbers, lap
 from trajopt.paths.spline import SplineBasis
@@ -53,15 +47,10 @@ class Path:
         if len(shape) != 2 or shape[0] != size or shape[1] not in (2, 3):
             raise ArgumentError("coordinates", shape, f"shape ({size}, 2) or ({size}, 3)")
         if self.heading is not None:
-            yaw = finite_numbers("heading", self.heading, f"angles of shape ({size},)")
-            if yaw.shape != (size,):
-                raise ArgumentError("heading", yaw.shape, f"shape ({size},)")
-        require_positive("turning_length", self.turning_length, "m")
-        if (
-            self.heading is not None
-            and shape[1] == 3
-            and np.ptp(self.coordinates[: len(self.basis.knots), 2]) > 0
-        ):
+            finite_numbers("heading", self.heading, f"angles of shape ({size},)", (size,))
+        arrays.require_positive("turning_length", self.turning_length, "m")
+        climbs = shape[1] == 3 and np.ptp(self.coordinates[: len(self.basis.knots), 2]) > 0
+        if self.heading is not None and climbs:
             raise ArgumentError(
                 "heading",
                 np.asarray(self.heading).tolist(),
@@ -98,11 +87,8 @@ class Path:
             raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
         yaw = None
         if heading is not None:
-            yaw = finite_numbers("heading", heading, "one angle a point")
-            if yaw.shape != (len(array),):
-                raise ArgumentError(
-                    "heading", yaw.shape, f"one angle a point, shape ({len(array)},)"
-                )
+            expected = f"one angle a point, shape ({len(array)},)"
+            yaw = finite_numbers("heading", heading, expected, (len(array),))
         if closed:
             array, yaw = lap(array, yaw)
         given = (
@@ -117,9 +103,8 @@ class Path:
         ends = []
         for name, end in (("start_direction", start_direction), ("end_direction", end_direction)):
             if end is not None:
-                ends.append(finite_numbers(name, end, f"{array.shape[1]} numbers"))
-                if ends[-1].shape != (array.shape[1],):
-                    raise ArgumentError(name, ends[-1].tolist(), f"{array.shape[1]} numbers")
+                dimensions = array.shape[1:]
+                ends.append(finite_numbers(name, end, f"{dimensions[0]} numbers", dimensions))
         coordinates = np.vstack([array, *ends]) if ends else array
         if yaw is not None and ends:  # ends turn at the mean rate, if clamped
             span = (yaw[-1] - yaw[0]) / (given[-1] - given[0])
@@ -193,7 +178,7 @@ class Path:
         The same function as ``basis.matrix(u, derivative) @ values``, in a tenth of the time for
         many points.
         """
-        require_whole("derivative", derivative, 0, "an order from 0 to 3", 3)
+        arrays.require_whole("derivative", derivative, 0, "an order from 0 to 3", 3)
         knots, cubics = self._cubics
         u = _row("u", u)
         i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(cubics) - 1)

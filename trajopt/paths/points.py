@@ -5,16 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, as_numbers
+from trajopt.arrays import Array, Shape, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.paths.spline import chord_length_knots
 
 _LARGEST = 1e7  # m (and rad): farther than any robot drives; squares of it keep nine digits of a metre. Chosen
 
 
-def finite_numbers(name: str, values: ArrayLike, expected: str) -> Array:
+def finite_numbers(
+    name: str, values: ArrayLike, expected: str, shape: Shape | None = None
+) -> Array:
     """``values`` as numbers that are finite and not beyond reach. Raises ArgumentError."""
-    array = as_numbers(name, values, expected)
+    array = as_numbers(name, values, expected, shape)
     if not np.all(np.abs(array) <= _LARGEST):  # NaN is refused too
         raise ArgumentError(name, array.tolist(), f"finite numbers, at most {_LARGEST:g} in size")
     return array
