@@ -18,6 +18,7 @@ from trajopt.objectives.terminal import TerminalObjective, terminal_objective
 from trajopt.optimize.base import OptimizeResult
 from trajopt.paths.path import Path
 from trajopt.problem import Problem
+from trajopt.shown import Shown
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.crossing import Standing, crossings
 
@@ -44,7 +45,7 @@ class Details(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Solution:
+class Solution(Shown):
     """What ``solve`` found; everything said of it is recomputed from path and trajectory.
 
     ``trajectory`` is None where no motion keeps the limits (``infeasible`` says which fails where)

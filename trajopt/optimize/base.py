@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array, BoolArray, IntArray, as_numbers, require_positive, require_whole
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective
+from trajopt.shown import Shown
 
 FEASIBLE = 1e-9  # violation up to which a candidate counts as feasible (rounding), chosen
 DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, [guzman2015] Table 5.8
@@ -89,8 +90,8 @@ class History:
     samples: Array
 
 
-@dataclass(frozen=True)
-class OptimizeResult:
+@dataclass(frozen=True, repr=False)
+class OptimizeResult(Shown):
     """Outcome of a search, in SciPy's names.
 
     ``fun`` and ``violation`` are recomputed by the objective at ``x`` after the search, more finely
@@ -118,6 +119,12 @@ class OptimizeResult:
     ngev: int = 0
     nhev: int = 0
     construct_seconds: float = 0.0
+
+    def __repr__(self) -> str:
+        return (
+            f"OptimizeResult({self.optimizer}, fun={self.fun:.6g}, success={self.success}, "
+            f"{self.nfev} evaluations)"
+        )
 
 
 class Optimizer(Protocol):

@@ -40,6 +40,7 @@ from trajopt.schema import (
     set_key,
     validated,
 )
+from trajopt.shown import Shown
 from trajopt.world.laid import lay
 from trajopt.world.scene import Scene
 
@@ -58,7 +59,7 @@ class Search:
     space: Space
 
 
-class Problem(Section):
+class Problem(Section, Shown):
     """A whole problem: which sections are there decides what ``solve`` does (``job``).
 
     ``source`` is the file it came from; ``replace`` makes changed copies.
@@ -98,6 +99,9 @@ class Problem(Section):
         return self.tables() == other.tables()
 
     # -- what the sections say -------------------------------------------------------------------
+
+    def __repr__(self) -> str:
+        return f"Problem({self.title!r}, {self.job.name}, {self.robot_section.name or self.robot_section.file})"
 
     @property
     def given(self) -> set[str]:

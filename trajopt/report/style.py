@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
 
 BLACK, GREY, LIGHT = "#000000", "#6b6b6b", "#c9c9c9"
@@ -50,6 +51,7 @@ LIMIT_COLOURS: Mapping[str, str] = MappingProxyType(
 )
 _SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed
 
+FORMATS = ("png", "pdf", "svg")
 RESOLUTION = 160  # dots an inch, chosen: sharp on a screen, 1100 pixels for a full-width figure
 WIDTH = 7.0  # inch, the text width of a report
 
@@ -98,9 +100,15 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 
 
 def save_figure(figure: Figure, file: FilePath) -> FilePath:
-    """Write a PNG under a temporary name, then rename it. Returns ``file``."""
+    """Write a picture, PNG, PDF or SVG by its suffix, whole or not at all. Returns ``file``.
+
+    Raises ArgumentError for another suffix.
+    """
+    kind = file.suffix.lower().lstrip(".")
+    if kind not in FORMATS:
+        raise ArgumentError("file", str(file), "a name that ends in .png, .pdf or .svg")
     with whole_file(file) as part:
-        figure.savefig(part, format="png", dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
+        figure.savefig(part, format=kind, dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
     return file
 
 

@@ -22,6 +22,7 @@ from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.robots.description import RobotDescription, WheelSection
 from trajopt.robots.wheel import Row, Wheel, WheelKind, kinematic, null_space, outline, wheel_rates
 from trajopt.schema import changes_of, read_tables, set_key, validated
+from trajopt.shown import Shown
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, [iso80000-3]
 DATA = Path(__file__).parent / "data"  # the shipped robots
@@ -50,7 +51,7 @@ class Body:
 
 
 @dataclass(frozen=True, repr=False)
-class Robot:
+class Robot(Shown):
     """Wheels on a body, from a ``description`` (see ``trajopt.robots.description``).
 
     Made by ``robot("car")``, ``Robot.load("mine.toml")`` or a builder such as

@@ -14,6 +14,7 @@ from trajopt.control.tracking import Tracker, TrackingController
 from trajopt.errors import ArgumentError, SimulationError
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.robots.robot import Robot
+from trajopt.shown import Shown
 from trajopt.simulate.build import build
 from trajopt.simulate.engine import Camera, Engine, Hit, Recording
 from trajopt.simulate.plan import WheelPlan, area_of, open_loop, wheel_plan
@@ -27,8 +28,8 @@ FASTER = 1.2  # than the fastest planned wheel, times: what feedback may ask of 
 SLIP_TIME = 0.05  # s over which slip is averaged: contacts of rollers chatter; chosen
 
 
-@dataclass(frozen=True, eq=False)
-class ValidationReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class ValidationReport(Shown):
     """How far the simulated motion is from the plan. Angles rad, lengths m.
 
     ``along`` and ``across``: final position error along and across the planned final direction of
@@ -60,6 +61,12 @@ class ValidationReport:
     steering: Array = field(repr=False)
     control: Mode | None = None
     seed: int = 0
+
+    def __repr__(self) -> str:
+        return (
+            f"ValidationReport({self.engine}, {1e3 * self.final_distance:.3g} mm and "
+            f"{1e3 * self.yaw:.3g} mrad off at the end, {len(self.contacts)} obstacles touched)"
+        )
 
     @property
     def final_distance(self) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,11 +17,15 @@ from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.robots.steering import steering_of
+from trajopt.shown import Shown
 from trajopt.timing.energy import energies
 from trajopt.timing.rests import Rest, rests_of
 from trajopt.timing.stages import Check, check, fine_rows
 from trajopt.timing.track import Track
 from trajopt.world.ground import Ground
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _BINDS = 2e-3  # relative margin below which a limit counts as binding; above the largest slow-down (0.1 %)
 _ON_TIME = 1e-12  # share of the duration by which a time may lie outside through rounding
@@ -54,8 +58,8 @@ class State:
     steering_rates: Array  # (N, K) rad/s
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Shown):
     """A path with a speed profile: s'' is constant between gridpoints, so s'^2 is linear in s
     there.
 
@@ -83,6 +87,19 @@ class Trajectory:
             expected = f"{count} finite angles, one a wheel that rolls, rad"
             raise ArgumentError("start_wheels", np.asarray(wheels).tolist(), expected)
         object.__setattr__(self, "start_wheels", wheels)
+
+    def __repr__(self) -> str:
+        robot = "no robot" if self.robot is None else self.robot.name
+        return f"Trajectory({robot}, {self.duration:.4g} s over {self.path.length:.4g} m)"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The motion in steps of at most 10 ms, the columns of ``trajectory.csv``; units in the
+        names."""
+        import pandas
+
+        from trajopt.report.motion import trajectory_table
+
+        return pandas.DataFrame(trajectory_table(self))
 
     @cached_property
     def times(self) -> Array:
