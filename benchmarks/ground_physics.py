@@ -42,7 +42,7 @@ SPEED, LENGTH, BEND = 1.0, 2.0, 0.08  # m/s, m, m: a slight S in two metres
 # m, standard deviation and correlation length of heights: a robot of half a metre without springs
 # stands on all its wheels within their give of 1 mm; on sharper ground two carry it and the limits,
 # which know a suspension, are too hopeful
-HILLS, HILL = 0.05, 2.5
+HILLS, HILL = 0.3, 20.0
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are made stiff, for
 # on soft ones a robot leans by its sag before it tips, and axles rigid, for one that tilts carries
@@ -61,7 +61,9 @@ TALL: dict[str, dict[str, Any]] = {
 }
 TIPS = {"downhill": 0.0, "across": math.pi / 2}
 FIRM = 2.0  # friction at which none slides
-FALL, LEAN = 2.5, math.radians(5.0)  # s in which a robot leans by that much when it tips over
+# s in which a robot leans by that much when it tips over; in more, one that stands on a wheel and two
+# castors turns about that wheel until it points downhill
+FALL, LEAN = 1.5, math.radians(3.0)
 WITHIN, RESOLUTION = math.radians(4.0), math.radians(0.3)
 
 Rows = Iterator[tuple[str, ...]]
@@ -71,7 +73,7 @@ def ground_of(name: str, place: str, friction: float) -> Ground:
     """A slope that rises along y, or hills."""
     if place == "rough":
         rng = np.random.default_rng(4)
-        return rough_ground(HILLS, rng=rng, size=8.0, correlation=HILL, spacing=0.1)
+        return rough_ground(HILLS, rng=rng, size=8.0, correlation=HILL, spacing=0.2)
     return Plane(math.atan(ROBOTS[name] * friction), math.pi / 2)
 
 

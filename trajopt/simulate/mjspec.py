@@ -15,9 +15,8 @@ from trajopt.world.height_map import HeightMap
 # never each other.
 WHEELS, GROUND, OUTLINE, OBSTACLES, NOTHING = (1, 2), (2, 1), (4, 8), (8, 4), (0, 0)
 ROTOR = 1e5  # kg m^2, chosen: no torque of a wheel changes its speed
-# On smooth ground, chosen: friction is that much stiffer than the contact (at 1 robots creep down
-# slopes), and this is the impedance of soft contacts (the closer to 1, the more they act like mass)
-FRICTION_IMPEDANCE, SOFT_IMPEDANCE = 100.0, 0.5
+# On smooth ground friction is that much stiffer than the contact, chosen: at 1 robots creep down slopes
+FRICTION_IMPEDANCE = 10.0
 STEERING_RATE = 100.0  # rad/s, natural frequency of a steering servo with its gear; chosen
 GROUND_COLOUR: Colour = (0.75, 0.62, 0.42)
 
@@ -90,7 +89,7 @@ class SpecBuilder:
             self._field(stage.field)
         for k in range(self.plates):
             plate = world.add_body(name=f"plate_{k}", mocap=True)
-            made = self._geom(plate, f"plate_{k}", kinds.mjGEOM_PLANE, [0, 0, 1], (0, _bit(k)))
+            made = self._geom(plate, f"plate_{k}", kinds.mjGEOM_PLANE, [0, 0, 1], NOTHING)
             made.rgba = [0.0, 0.0, 0.0, 0.0]
         for i, solid in enumerate(stage.solids):
             bits, body = GROUND, world
@@ -137,8 +136,8 @@ class SpecBuilder:
             if joint.drive == "position":
                 made.armature = joint.stiffness / STEERING_RATE**2
         bits = WHEELS if link.meets == "ground" else OUTLINE
-        if link.wheel >= 0 and self.plates:
-            bits = (_bit(link.wheel), 0)
+        if link.wheel >= 0 and self.smooth:
+            bits = NOTHING  # see _meet
         same = link.shapes == link.looks
         for i, shape in enumerate(link.shapes):
             colour = link.colour if same else None
@@ -146,9 +145,22 @@ class SpecBuilder:
             geom.friction = [link.grip * self.friction, 0.0, 0.0]
             # friction is the larger of two, unless one has priority
             geom.priority = int(link.grip < 1.0)
+            if link.wheel >= 0 and self.smooth:
+                self._meet(f"{name}_{i}", link)
         for i, shape in enumerate(() if same else link.looks):
             self._shape(body, f"{name}_look_{i}", shape, NOTHING, link.colour)
         return body
+
+    def _meet(self, geom: str, link: Link) -> None:
+        """Contact of a wheel with the plane under it: a pair, whose friction has a time constant of
+        its own. Where it has that of a soft contact, wheels slide outward in bends: MuJoCo leaves
+        out that directions of friction turn, and brings the slip to rest at that rate only."""
+        pair = self.spec.add_pair(name=f"meet_{geom}")
+        pair.geomname1 = f"plate_{link.wheel}" if self.plates else "ground"
+        pair.geomname2, pair.condim = geom, 3
+        pair.friction = [link.grip * self.friction] * 2 + [0.0] * 3
+        pair.solref = [self.options.contact_time, self.options.contact_damping]
+        pair.solreffriction = pair.solref
 
     def _motor(self, name: str, effort: float) -> None:
         """Holds a wheel at the speed of a heavy rotor, which the session sets, with at most
@@ -210,11 +222,6 @@ class SpecBuilder:
         geom.friction = [self.friction, 0.0, 0.0]
         geom.solref = [self.options.contact_time, self.options.contact_damping]
         return geom
-
-
-def _bit(wheel: int) -> int:
-    """What a wheel and its plate collide by."""
-    return 1 << (4 + wheel)
 
 
 def _set_linear(joint: Any, name: str, value: float) -> None:

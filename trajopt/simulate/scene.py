@@ -65,8 +65,8 @@ class Stage:
 
     @property
     def plates(self) -> bool:
-        """Whether wheels meet planes that move along with them, instead of the ``field``."""
-        return self.field is not None and not self.broken
+        """Whether wheels meet planes that move along with them, instead of plates and ``field``."""
+        return self.plane is None and not self.broken
 
     @property
     def has_obstacles(self) -> bool:

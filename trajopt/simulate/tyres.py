@@ -13,11 +13,13 @@ from trajopt.simulate.rollers import disc_inertia
 
 # A castor's fork and a steered wheel's knuckle, of the wheel's mass; chosen.
 FORK_SHARE = 0.2
-# Tyres and rollers on smooth ground give way by this much under the robot's weight, m, at these
-# shares of critical damping, chosen: contacts that are equally soft share the load as the limits
-# assume. Hard rollers on four wheels leave two of them without load; at 0.8, those of turning wheels
-# carry 3/4 of a robot that moves diagonally, as each comes down on the ground at speed (measured).
-TYRE_SAG, TYRE_DAMPING, ROLLER_DAMPING = 0.002, 0.8, 0.2
+# Tyres on smooth ground give way by this much under the robot's weight, m, at this share of critical
+# damping, and so does each part of a rim of rollers, of which several touch at once; chosen: contacts
+# that are equally soft share the load as the limits assume. Hard rollers on four wheels leave two of
+# them without load; at a damping of 0.8 those of turning wheels carry 3/4 of a robot that moves
+# diagonally, as each comes down on the ground at speed (measured).
+TYRE_SAG, TYRE_DAMPING = 0.0005, 0.8
+ROLLER_SAG, ROLLER_DAMPING = 0.002, 0.2
 _ACROSS = Pose.along((0.0, 1.0, 0.0))
 
 
@@ -75,6 +77,7 @@ def give(model: Model, link: Link) -> tuple[float, float] | None:
     if not (ball or link.joint.role == "roller"):
         return None
     load = model.mass / len(model.feet)
-    stiffness = load * STANDARD_GRAVITY / TYRE_SAG
-    share = ROLLER_DAMPING if link.joint.role == "roller" else TYRE_DAMPING
+    stiffness, share = load * STANDARD_GRAVITY / TYRE_SAG, TYRE_DAMPING
+    if link.joint.role == "roller":
+        stiffness, share = load * STANDARD_GRAVITY / ROLLER_SAG, ROLLER_DAMPING
     return stiffness, share * 2.0 * math.sqrt(stiffness * load)
