@@ -144,7 +144,7 @@ def safe_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[
             closed = driven(trajectory, friction, engine, closed=True)
             moving = opened.recording.times < trajectory.duration
             off = np.abs(opened.recording.loads - opened.wheel_plan.loads)[moving].mean(axis=0)
-            weight = trajectory.robot.body.mass * STANDARD_GRAVITY
+            weight = robot(name).body.mass * STANDARD_GRAVITY
             yield (
                 name, place, f"{friction:g}", engine, f"{trajectory.duration:.2f}",
                 f"{100 * opened.final_distance / opened.length:.2f}",

@@ -93,7 +93,7 @@ def test_robots_stay_where_they_stand_and_weigh_what_they_should(shape: str, eng
     normals.move(last.wheel_places)
     pushed = last.loads @ normals.normal[:, 2]  # the rest is friction's, by the slope's sine
     assert pushed == pytest.approx(weight * up[2] ** 2, rel=0.05)
-    assert last.loads.min() > 0.1 * weight / 4
+    assert np.count_nonzero(last.loads > 1.0) >= 3  # on a bend one of four may hang
 
 
 def test_plates_are_tangent_where_wheels_touch() -> None:

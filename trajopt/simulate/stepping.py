@@ -35,7 +35,8 @@ from trajopt.simulate.sensors import Sense, exact
 from trajopt.simulate.standing import beyond, standing
 from trajopt.world.scene import Scene
 
-SETTLE, SETTLE_ON_SPRINGS = 0.2, 0.5  # s at rest before the command starts, chosen
+SETTLE, SETTLE_ON_SPRINGS = 0.2, 0.5  # s at rest before the command starts, chosen; the second also on
+# bent ground, where the robot falls by some millimetres
 # A run has left physics beyond these (chosen: an order above anything that a wheeled robot shows).
 MAX_SPEED = 20.0  # m/s of the robot frame
 MAX_HEIGHT = 1.0  # m of the robot frame above or below the ground
@@ -83,7 +84,7 @@ def open_session(
     stand = stage(scene, area)
     model = build(robot, discs=stand.broken, outline=stand.has_obstacles)
     if settle is None:
-        settle = SETTLE_ON_SPRINGS if model.springs else SETTLE
+        settle = SETTLE_ON_SPRINGS if model.springs or stand.plates else SETTLE
     if not (math.isfinite(settle) and settle >= 0.0):
         raise ArgumentError("settle", settle, "a time of at least 0 s")
     joints: dict[int, float] = {}
