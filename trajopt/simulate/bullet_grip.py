@@ -17,24 +17,26 @@ class Grip:
 
     Bullet bounds two directions of friction, of which the first has no x, each by itself. A tyre
     that pulls between them would hold too well: it gets the friction at which the bounds' corner
-    holds what it should. Rollers have both directions laid along their axes, each as long as its
-    share: together they hold |c1| + |c2| times what one does.
+    holds what it should. ``rollers``, where these have to share the load, have both directions laid
+    along their axes, each as long as its share: together they hold |c1| + |c2| times what one does.
     """
 
     def __init__(
-        self, bullet: Client, model: Model, robot: int, joint: list[int], friction: float
-    ) -> None:
+        self, bullet: Client, model: Model, robot: int, joint: list[int], friction: float,
+        *, rollers: bool,
+    ) -> None:  # fmt: skip
         self.bullet, self.robot, self.model = bullet, robot, model
         # links of each wheel that touch the ground; of those with rollers the lowest one's axis
         found = [np.flatnonzero(model.is_roller & (model.parents == foot)) for foot in model.feet]
         self.links = [
-            rollers.tolist() if len(rollers) else [foot]
-            for rollers, foot in zip(found, model.feet, strict=True)
+            links.tolist() if len(links) else [foot]
+            for links, foot in zip(found, model.feet, strict=True)
         ]
-        self.rolling = [k for k, rollers in enumerate(found) if len(rollers)]
+        rims = [k for k, links in enumerate(found) if len(links)]
+        self.rolling = rims if rollers else []
         lowest = [min(self.links[k], key=lambda i: model.frames[i][0][2]) for k in self.rolling]
         self.axes = np.array([model.frames[i][1][:, 2] for i in lowest]).reshape(-1, 3)
-        tyres = [k for k in range(len(model.feet)) if k not in self.rolling]
+        tyres = [k for k in range(len(model.feet)) if k not in rims]
         self.tyre_of = {joint[self.links[k][0]]: k for k in tyres}
         self.joint, self.friction = joint, friction
         self.shares = np.ones(len(model.feet))

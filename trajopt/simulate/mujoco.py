@@ -78,7 +78,7 @@ class MuJoCo:
             ) from error
         session = _Session(mujoco, compiled, model, stage)
         if not stage.broken:
-            session.soften()
+            session.soften(stage.uneven)
         session.place(start)
         yield session
 
@@ -126,8 +126,8 @@ class _Session:
         for i in range(len(stage.solids)):
             self.solid_of[compiled.geom(f"solid_{i}").id] = i
 
-    def soften(self) -> None:
-        """Makes tyres and rollers as soft as ``tyres.give`` says.
+    def soften(self, uneven: bool) -> None:
+        """Makes tyres, and on ``uneven`` ground rollers, as soft as ``tyres.give`` says.
 
         Solref's direct form k, b acts in acceleration, through the regularisation R = (1 - d)/d A of
         a body with the inverse weight A: force = (k r + b v) / ((1 - d) A), with d the impedance.
@@ -137,7 +137,7 @@ class _Session:
         for pair, geom in enumerate(compiled.pair_geom2):
             link = self.model.links[self.link_of[geom]]
             soft = give(self.model, link)
-            if soft is None:
+            if soft is None or (link.joint.role == "roller" and not uneven):
                 continue
             d = ROLLER_IMPEDANCE if link.joint.role == "roller" else TYRE_IMPEDANCE
             weight = (1.0 - d) * compiled.body_invweight0[compiled.geom_bodyid[geom], 0]

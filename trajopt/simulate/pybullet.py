@@ -172,7 +172,9 @@ class _Session:
             # small angles keep their digits: whole turns are added when reading
             bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
             self.offset[link] = float(angle - fold(float(angle)))
-        self.grip = Grip(bullet, model, self.robot, self.joint, stage.scene.friction)
+        self.grip = Grip(
+            bullet, model, self.robot, self.joint, stage.scene.friction, rollers=stage.uneven
+        )
         self.turns = np.array([self.offset[link] for link in model.targets])
         self.before: Array | None = None
         links = model.links
@@ -211,12 +213,12 @@ class _Session:
             lateralFriction=link.grip * self.stage.scene.friction, spinningFriction=0.0,
             rollingFriction=0.0, restitution=0.0,
         )  # fmt: skip
-        if link.joint.role == "roller":
-            bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
         rolls = link.joint.role == "roller"
-        if rolls:  # friction along the axis alone: light rollers would never get up to speed
+        if (
+            rolls and self.stage.uneven
+        ):  # friction along the axis alone: light rollers would never get up to speed
             bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
-        soft = None if self.stage.broken and rolls else give(self.model, link)
+        soft = None if rolls and not self.stage.uneven else give(self.model, link)
         if soft is not None:
             bullet.changeDynamics(robot, joint, contactStiffness=soft[0], contactDamping=soft[1])
         meets = WHEELS if link.meets == "ground" else OUTLINE

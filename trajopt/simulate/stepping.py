@@ -35,7 +35,10 @@ from trajopt.simulate.sensors import Sense, exact
 from trajopt.simulate.standing import beyond, standing
 from trajopt.world.scene import Scene
 
-SETTLE, SETTLE_ON_SPRINGS = 0.2, 0.5  # s at rest before the command starts, chosen; the second also on
+SETTLE, SETTLE_ON_SPRINGS = (
+    0.2,
+    0.5,
+)  # s at rest before the command starts, chosen; the second also on
 # bent ground, where the robot falls by some millimetres
 # A run has left physics beyond these (chosen: an order above anything that a wheeled robot shows).
 MAX_SPEED = 20.0  # m/s of the robot frame
