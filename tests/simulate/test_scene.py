@@ -256,7 +256,7 @@ def test_friction_acts(engine: str) -> None:
         way.append(float(run.pose[-1, 0]) - at)
         speed = (at - float(np.interp(1.9, run.times, run.pose[:, 0]))) / 0.1
         share = run.loads[-1, :2].sum() / run.loads[-1].sum() / (1 - friction * height / base)
-        assert way[-1] == pytest.approx(speed**2 / (2 * friction * 9.81 * share), rel=0.05)
+        assert way[-1] == pytest.approx(speed**2 / (2 * friction * 9.81 * share), rel=0.08)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
