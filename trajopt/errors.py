@@ -22,6 +22,9 @@ def _restored(
     return error
 
 
+_LONGEST = 1000  # characters of what would be right: names in it may be of any length; chosen
+
+
 class ArgumentError(TrajoptError, ValueError):
     """A call got a value it cannot use.
 
@@ -30,7 +33,9 @@ class ArgumentError(TrajoptError, ValueError):
 
     def __init__(self, argument: str, value: Any, expected: str) -> None:
         self.argument, self.value, self.expected = argument, value, expected
-        super().__init__(printable(f"{_cut(argument)} = {_short(value)}: expected {expected}"))
+        super().__init__(
+            printable(f"{_cut(argument)} = {_short(value)}: expected {_cut(expected, _LONGEST)}")
+        )
 
 
 class ProblemError(TrajoptError, ValueError):
@@ -41,7 +46,9 @@ class ProblemError(TrajoptError, ValueError):
 
     def __init__(self, file: str, key: str, value: Any, expected: str) -> None:
         self.file, self.key, self.value, self.expected = file, key, value, expected
-        super().__init__(printable(f"{file}: {_cut(key)} = {_short(value)}: expected {expected}"))
+        super().__init__(
+            printable(f"{file}: {_cut(key)} = {_short(value)}: expected {_cut(expected, _LONGEST)}")
+        )
 
 
 class InfeasibleError(TrajoptError):
@@ -53,7 +60,9 @@ class InfeasibleError(TrajoptError):
 
     def __init__(self, limit: str, place: float, reason: str) -> None:
         self.limit, self.place, self.reason = limit, place, reason
-        super().__init__(f"infeasible: limit '{limit}' at s = {place:.4g}: {reason}")
+        super().__init__(
+            f"infeasible: limit '{limit}' at s = {place:.4g}: {_cut(reason, _LONGEST)}"
+        )
 
 
 class MissingDependencyError(TrajoptError, ImportError):

@@ -20,6 +20,7 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, TrajoptError
 
+LARGEST = 1e9  # of a number, m, kg, s, N m, ...: beyond, products leave the numbers; chosen
 LARGEST_TABLE = (
     100_000_000  # bytes of a table of numbers; chosen: an hour in steps of a millisecond
 )
@@ -83,8 +84,8 @@ def read_table(
                 raise ValueError(f"{len(row)} fields instead of {len(header)}")
             for name, place, values in zip(columns, places, found, strict=True):
                 value = float(row[place] or "nan") if "_" not in row[place] else math.nan
-                if not math.isfinite(value) and name not in free:
-                    raise ValueError(f"{name} = {row[place]!r}, which is not finite")
+                if name not in free and not abs(value) <= LARGEST:
+                    raise ValueError(f"{name} = {row[place]!r}, beyond {LARGEST:g} or not finite")
                 values.append(value)
     except (OSError, TypeError, ValueError, csv.Error) as error:
         where = f"{file}, row {number}" if number else str(file)

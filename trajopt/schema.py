@@ -23,10 +23,10 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic_core import PydanticCustomError
 
 from trajopt.errors import ProblemError
-from trajopt.files import content_of
+from trajopt.files import LARGEST, content_of
 
 Model = TypeVar("Model", bound=BaseModel)
-LARGEST, SMALLEST = 1e9, 1e-9  # m, kg, s, N m, ...: beyond, products leave the numbers; chosen
+SMALLEST = 1e-9  # of what is positive, as ``files.LARGEST``
 
 
 def _not_tiny(value: float) -> float:

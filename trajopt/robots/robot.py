@@ -236,6 +236,9 @@ class Robot(Shown):
     def turning_length(self) -> float:
         """m; weighs yaw against translation in the path parameter of robots that can turn on the
         spot, sqrt(dx^2 + dy^2 + (L dpsi)^2): the largest distance of a wheel from the origin."""
+        if not self.wheels:
+            expected = "at least one wheel whose spin follows from the motion"
+            raise ArgumentError("robot.wheels", self.name, expected)
         return float(max(w.l for w in self.wheels))
 
     @cached_property

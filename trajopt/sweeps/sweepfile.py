@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, JsonValue
+from pydantic import BeforeValidator, Field, JsonValue, ValidationError
 
 from trajopt.errors import ArgumentError, ProblemError
 from trajopt.schema import (
@@ -131,7 +131,10 @@ def _plan(file: SweepFile, text: str) -> SweepPlan:
 
 def _axes(file: SweepFile) -> dict[str, Axis]:
     """Axes of the file; ``[solve]`` is short for axes ``run.*`` of one value each."""
-    axes = {f"run.{name}": Axis(values=(value,)) for name, value in file.solve.items()}
+    try:
+        axes = {f"run.{name}": Axis(values=(value,)) for name, value in file.solve.items()}
+    except ValidationError:
+        raise ArgumentError("solve", file.solve, "values that are finite") from None
     if twice := axes.keys() & file.axes.keys():
         raise ArgumentError("solve", sorted(twice), "each name once, in axes or in solve")
     return {**axes, **file.axes}

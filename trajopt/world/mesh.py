@@ -152,7 +152,7 @@ def load_mesh(file: str | FilePath, spacing: float, *, grade: float = np.pi / 3)
         raise ArgumentError("ground.file", str(path), "an existing .obj or .stl file")
     try:
         vertices, faces = readers[path.suffix.lower()](path)
-    except (OSError, ValueError, IndexError) as error:
+    except (OSError, ValueError, IndexError, OverflowError) as error:
         raise ArgumentError("ground.file", str(path), f"triangles ({error})") from error
     if not len(faces):
         raise ArgumentError("ground.file", str(path), "at least one triangle")
