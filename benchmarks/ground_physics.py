@@ -46,9 +46,17 @@ HILLS, HILL = 0.3, 20.0
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are made stiff, for
 # on soft ones a robot leans by its sag before it tips, and axles rigid, for one that tilts carries
-# at its middle: the limit knows neither.
+# at its middle: the limit knows neither. Castors are blocked, for else PowerBot turns about its lower
+# drive wheel, which alone is loaded, before it tips across.
 TALL: dict[str, dict[str, Any]] = {
-    "powerbot": {"body.cog": [-0.132, 0.0, 0.7]},
+    "powerbot": {
+        "body.cog": [-0.132, 0.0, 0.7],
+        **{
+            f"wheels.castor-{side}.{key}": value
+            for side, y in (("left", 0.22), ("right", -0.22))
+            for key, value in (("kind", "fixed"), ("trail", None), ("position", [-0.35, y]))
+        },
+    },
     "loc8": {"body.cog": [0.0, 0.0, 0.7]},
     "asoc-4": {
         "body.cog": [0.0, 0.0, 0.9],
@@ -61,9 +69,7 @@ TALL: dict[str, dict[str, Any]] = {
 }
 TIPS = {"downhill": 0.0, "across": math.pi / 2}
 FIRM = 2.0  # friction at which none slides
-# s in which a robot leans by that much when it tips over; in more, one that stands on a wheel and two
-# castors turns about that wheel until it points downhill
-FALL, LEAN = 1.5, math.radians(3.0)
+FALL, LEAN = 2.0, math.radians(3.0)  # s in which a robot leans by that much when it tips over
 WITHIN, RESOLUTION = math.radians(4.0), math.radians(0.3)
 
 Rows = Iterator[tuple[str, ...]]
