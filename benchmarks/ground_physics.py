@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.common import ResultTable, publish
 from trajopt.errors import SimulationError
+from trajopt.limits.contact import Contact
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip, support_edges
@@ -43,6 +44,9 @@ SPEED, LENGTH, BEND = 1.0, 2.0, 0.08  # m/s, m, m: a slight S in two metres
 # stands on all its wheels within their give of 1 mm; on sharper ground two carry it and the limits,
 # which know a suspension, are too hopeful
 HILLS, HILL = 0.3, 20.0
+LOAD = (
+    0.1  # of an even share, left on every wheel: PowerBot would brake with its castors in the air
+)
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are made stiff, for
 # on soft ones a robot leans by its sag before it tips, and axles rigid, for one that tilts carries
@@ -94,7 +98,7 @@ def plan(name: str, place: str, friction: float, share: float) -> Trajectory:
     path = Path.through(
         points @ np.array([[cos, sin], [-sin, cos]]), heading=[0.0, 0.0, 0.0] if keeps else None
     )
-    limits = (Speed(SPEED), Slip(share * friction, per_wheel=share <= 1.0), Tip())
+    limits = (Speed(SPEED), Slip(share * friction, per_wheel=share <= 1.0), Tip(), Contact(LOAD))
     return time_scale(path, limits, robot=machine, ground=ground_of(name, place, friction))
 
 
