@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.common import ResultTable, publish
 from trajopt.errors import SimulationError
+from trajopt.limits.contact import Contact
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip, support_edges
@@ -43,12 +44,23 @@ SPEED, LENGTH, BEND = 1.0, 2.0, 0.08  # m/s, m, m: a slight S in two metres
 # stands on all its wheels within their give of 1 mm; on sharper ground two carry it and the limits,
 # which know a suspension, are too hopeful
 HILLS, HILL = 0.3, 20.0
+LOAD = (
+    0.1  # of an even share, left on every wheel: PowerBot would brake with its castors in the air
+)
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are made stiff, for
 # on soft ones a robot leans by its sag before it tips, and axles rigid, for one that tilts carries
-# at its middle: the limit knows neither.
+# at its middle: the limit knows neither. Castors are blocked, for else PowerBot turns about its lower
+# drive wheel, which alone is loaded, before it tips across.
 TALL: dict[str, dict[str, Any]] = {
-    "powerbot": {"body.cog": [-0.132, 0.0, 0.7]},
+    "powerbot": {
+        "body.cog": [-0.132, 0.0, 0.7],
+        **{
+            f"wheels.castor-{side}.{key}": value
+            for side, y in (("left", 0.22), ("right", -0.22))
+            for key, value in (("kind", "fixed"), ("trail", None), ("position", [-0.35, y]))
+        },
+    },
     "loc8": {"body.cog": [0.0, 0.0, 0.7]},
     "asoc-4": {
         "body.cog": [0.0, 0.0, 0.9],
@@ -61,9 +73,7 @@ TALL: dict[str, dict[str, Any]] = {
 }
 TIPS = {"downhill": 0.0, "across": math.pi / 2}
 FIRM = 2.0  # friction at which none slides
-# s in which a robot leans by that much when it tips over; in more, one that stands on a wheel and two
-# castors turns about that wheel until it points downhill
-FALL, LEAN = 1.5, math.radians(3.0)
+FALL, LEAN = 2.0, math.radians(3.0)  # s in which a robot leans by that much when it tips over
 WITHIN, RESOLUTION = math.radians(4.0), math.radians(0.3)
 
 Rows = Iterator[tuple[str, ...]]
@@ -88,7 +98,7 @@ def plan(name: str, place: str, friction: float, share: float) -> Trajectory:
     path = Path.through(
         points @ np.array([[cos, sin], [-sin, cos]]), heading=[0.0, 0.0, 0.0] if keeps else None
     )
-    limits = (Speed(SPEED), Slip(share * friction, per_wheel=share <= 1.0), Tip())
+    limits = (Speed(SPEED), Slip(share * friction, per_wheel=share <= 1.0), Tip(), Contact(LOAD))
     return time_scale(path, limits, robot=machine, ground=ground_of(name, place, friction))
 
 

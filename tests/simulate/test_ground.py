@@ -181,6 +181,16 @@ def test_a_sample_slips_beyond_its_limits() -> None:
     assert driven(plan("car", "contour", 0.6, 1.2), 0.6, "mujoco").slip_share > 0.06
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", ["powerbot", "car", "swerve"])
+def test_robots_whose_wheels_share_the_force_slip_beyond_their_limits(
+    name: str, engine: str
+) -> None:
+    """Of the others each wheel is bounded by itself: where one slips, the rest can still hold."""
+    assert driven(plan(name, "diagonal", 0.6, 1.2), 0.6, engine).slip_share > 0.06
+
+
 @pytest.mark.parametrize("word", TIPS)
 def test_a_tall_powerbot_tips_where_the_model_says(word: str) -> None:
     """[closed form] atan(0.132 / 0.7) downhill over the drive axle; across, over the line from a

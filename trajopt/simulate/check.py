@@ -25,6 +25,7 @@ from trajopt.world.scene import Scene
 from trajopt.world.terrain import Flat
 
 FASTER = 1.2  # than the fastest planned wheel, times: what feedback may ask of wheels; chosen
+LOADED = 0.02  # of the weight, below which a wheel's slip does not count; chosen
 SLIP_TIME = 0.05  # s over which slip is averaged: contacts of rollers chatter; chosen
 
 
@@ -81,11 +82,14 @@ class ValidationReport(Shown):
 
     @property
     def slip_share(self) -> float:
-        """Largest mean slip of a wheel over ``SLIP_TIME``, over the plan's largest speed."""
+        """Largest mean slip of a wheel over ``SLIP_TIME``, over the plan's largest speed; a wheel
+        that carries less than ``LOADED`` of the weight, as a castor in hard braking, may flutter."""
         t, places = self.recording.times, self.planned[:, :2]
         top = float((np.hypot(*np.diff(places, axis=0).T) / np.diff(t)).max())
         count = max(round(SLIP_TIME / float(t[1] - t[0])), 1)
-        total = np.cumsum(np.vstack([np.zeros(len(self.wheels)), self.recording.slip]), axis=0)
+        loads = self.recording.loads
+        slip = self.recording.slip * (loads > LOADED * loads.sum(axis=1, keepdims=True).mean())
+        total = np.cumsum(np.vstack([np.zeros(len(self.wheels)), slip]), axis=0)
         mean = (total[count:] - total[:-count]) / count
         return float(mean.max()) / top
 
