@@ -8,18 +8,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from tests.fuzz.kinds import ROOT
 from trajopt.cli import app
-from trajopt.control.commands import compare_log
+from trajopt.control.commands import LOG_COLUMNS, compare_log
 from trajopt.errors import TrajoptError
 from trajopt.files import LARGEST_TABLE, read_table
 from trajopt.pipeline import solve
 from trajopt.problem import load_problem
 from trajopt.robots.robot import Robot
 from trajopt.sweeps.sweepfile import load_sweep
+from trajopt.timing.grid import split
+from trajopt.world.mesh import load_mesh
 
 PROBLEMS = ROOT / "problems"
 READERS: tuple[Callable[[Any], Any], ...] = (load_problem, load_sweep, Robot.load)
@@ -144,3 +147,45 @@ def test_a_title_is_printed_as_it_is(tmp_path: Path) -> None:
     assert done.exit_code == 0
     assert "[/bold]\\x1b[2J :smile:" in done.output
     assert "\x1b" not in done.output
+
+
+def test_numbers_and_names_that_damaged_files_hold(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t,x,y,yaw,v\n0,0,0,0,0\n1,1e200,0,0,0\n")
+    text = told(read_table, log, LOG_COLUMNS)
+    assert "row 3" in text
+    assert "beyond 1e+09" in text
+    mesh = tmp_path / "a.obj"
+    for corner in ("9" * 400, "[" * 3000):
+        mesh.write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 {corner}\n")
+        assert "triangles" in told(load_mesh, mesh, 0.1)
+    sweep = tmp_path / "sweep.toml"
+    sweep.write_text(
+        'run = "tests.sweeps.run_functions:cheap"\n[axes.x]\nvalues = [1]\n[solve]\ny = inf\n'
+    )
+    assert "solve" in told(load_sweep, sweep)
+
+
+def test_a_robot_without_a_rolling_wheel_has_no_turning_length() -> None:
+    balls = [
+        {
+            "name": f"ball-{i}",
+            "kind": "spherical",
+            "position": at,
+            "radius": 0.05,
+            "width": 0.05,
+            "mass": 0.1,
+        }
+        for i, at in enumerate([[0.2, 0.1], [0.2, -0.1], [-0.2, 0.0]])
+    ]
+    body = {"mass": 5.0, "cog": [0.0, 0.0, 0.1], "chassis": [0.4, 0.3, 0.1], "clearance": 0.05}
+    machine = Robot.of({"name": "balls", "body": body, "wheels": balls})
+    with pytest.raises(TrajoptError, match="at least one wheel"):
+        _ = machine.turning_length
+
+
+def test_refinement_ends_before_memory_does() -> None:
+    u = np.linspace(0.0, 1.0, 60_001)
+    assert len(split(u, np.arange(60_000) < 10, 3, 100_000)) == 60_021
+    with pytest.raises(TrajoptError, match="at most 100000 gridpoints"):
+        split(u, np.ones(60_000, dtype=bool), 3, 100_000)

@@ -16,7 +16,7 @@ FORK_SHARE = 0.2
 # Tyres on smooth ground give way by this much under the robot's weight, m, at this share of critical
 # damping, and on slopes and hills so does each part of a rim of rollers, of which several touch at
 # once; chosen: contacts that are equally soft share the load as the limits assume. Hard rollers on
-# four wheels leave two of them without load there; on level ground soft ones lose up to 2 % sideways,
+# four wheels leave two of them without load there; on level ground soft ones lose some 2 % sideways,
 # where a tilting axis costs 1.1 % (measured). At a damping of 0.8 those of turning wheels carry 3/4 of a robot that moves
 # diagonally, as each comes down on the ground at speed (measured).
 TYRE_SAG, TYRE_DAMPING = 0.0005, 0.8

@@ -18,7 +18,7 @@ _CELLS = (
 )
 _CELLS_PER_SEGMENT = 20  # at least this many on a spline segment; chosen
 _MOST = 1_000_000  # gridpoints that a caller may ask for; chosen
-_MOST_REFINED = 100_000  # gridpoints that refinement may make: half a gigabyte of rows; chosen
+MOST_REFINED = 100_000  # gridpoints that refinement may make: half a gigabyte of rows; chosen
 _MERGE = 1e-12  # gridpoints closer than this share of the path's length are one
 
 
@@ -65,11 +65,11 @@ def insert(path: Path, u: Array, places: Array) -> Array:
     return np.sort(np.concatenate([u, new]))
 
 
-def split(u: Array, where: BoolArray, parts: int) -> Array:
+def split(u: Array, where: BoolArray, parts: int, most: int) -> Array:
     """Grid with the intervals ``where`` (N,) cut into ``parts`` equal ones. Raises ArgumentError for
-    more gridpoints than memory is meant to hold."""
-    if len(u) + (parts - 1) * int(where.sum()) > _MOST_REFINED:
-        expected = f"a path whose limits are kept with at most {_MOST_REFINED} gridpoints"
+    more than ``most`` gridpoints."""
+    if len(u) + (parts - 1) * int(where.sum()) > most:
+        expected = f"a path whose limits are kept with at most {most} gridpoints"
         raise ArgumentError("path", f"{len(u)} gridpoints, which are not enough", expected)
     fractions = np.arange(1, parts) / parts
     new = u[:-1][where, None] + (u[1:] - u[:-1])[where, None] * fractions

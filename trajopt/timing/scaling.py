@@ -18,7 +18,7 @@ from trajopt.robots.robot import Robot
 from trajopt.timing.compiled import forward_profile
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
 from trajopt.timing.feasibility import require_motion
-from trajopt.timing.grid import initial_grid, insert, split
+from trajopt.timing.grid import MOST_REFINED, initial_grid, insert, split
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
 from trajopt.timing.rests import AT, with_rests
@@ -276,7 +276,7 @@ def _fastest(job: _Job, fine: FineRows, tighter: float) -> tuple[FineRows, Array
 def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, float, str]:
     """Rows, s'^2, the factor on it that is left, and engine, on a grid refined where limits are
     broken."""
-    plain = _with_edges(job, u)
+    plain, most = _with_edges(job, u), max(MOST_REFINED, 2 * len(u))
     for done in range(MOST_ROUNDS):
         fine, sd2, name = _fastest(job, plain, tighter)
         found = check(fine, sd2)
@@ -290,7 +290,7 @@ def _refined(job: _Job, u: Array, tighter: float) -> tuple[FineRows, Array, floa
                 "segments" if job.engine == "segments" else name,
             )
         if done < MOST_ROUNDS - 1:
-            grid = split(fine.u, excess > REFINE_ABOVE, 3)
+            grid = split(fine.u, excess > REFINE_ABOVE, 3, most)
             plain = refined(job.track, plain, grid, job.limits)
     at = int(np.argmax(excess))
     limit = job.limits[int(np.argmin(found.slack[at]))].name
