@@ -76,8 +76,8 @@ def robot_figure(
         f"{robot.name}: mobility {found.mobility}, steerability {found.steerability}, "
         f"manoeuvrability {found.manoeuvrability}"
     )
-    axes.set_xlabel("x forward, m")
-    axes.set_ylabel("y left, m")
+    axes.set_xlabel("x forward (m)")
+    axes.set_ylabel("y left (m)")
     return figure
 
 

@@ -61,7 +61,7 @@ def geometry_figure(wheel: DoubleWheel, height: float) -> Figure:
         drawn = ax.contourf(
             np.degrees(theta), np.degrees(alpha), values, levels=levels, cmap=colours, extend="both"
         )
-        figure.colorbar(drawn, ax=ax)
+        figure.colorbar(drawn, ax=ax, label=title)
         ax.contour(
             np.degrees(theta),
             np.degrees(alpha),
