@@ -12,7 +12,8 @@ from PIL import Image, ImageDraw
 
 from benchmarks.common import ROOT
 from benchmarks.figure_examples import FIGURES
-from trajopt.report.style import FORMATS, in_style, save_figure
+from trajopt.report.files import FORMATS
+from trajopt.report.style import in_style, save_figure
 
 WIDE, HIGH, COLUMNS = 560, 460, 6  # pixels of a cell, chosen
 

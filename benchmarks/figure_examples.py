@@ -182,7 +182,7 @@ def stored() -> Figure:
 
 
 def motions() -> Figure:
-    ways = [_WAY + [0, 0.03 * k, 0] for k in range(-6, 7)]
+    ways = [_WAY + np.array([0, 0.03 * k, 0]) for k in range(-6, 7)]
     panel = Motions("closed loop", ways, [abs(k) < 4 for k in range(-6, 7)], _WAY, 1.4, "blue: reached")  # fmt: skip
     return motions_figure([panel, panel], loc8_smdw(), columns=2)
 

@@ -36,6 +36,7 @@ from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.samples import sample_at
+from trajopt.report.style import in_style, save_figure
 from trajopt.timing.bounds import bounds_profile
 from trajopt.timing.compiled import compiled_profile, fastest_profiles
 from trajopt.timing.scaling import time_scale
@@ -265,7 +266,9 @@ def growth(quick: bool) -> tuple[ResultTable, str]:
         )
     FIGURES.mkdir(parents=True, exist_ok=True)
     with in_style():
-        growth = growth_figure({"compiled": (sizes, ours), "toppra": (sizes[: len(theirs)], theirs)})
+        growth = growth_figure(
+            {"compiled": (sizes, ours), "toppra": (sizes[: len(theirs)], theirs)}
+        )
         picture = save_figure(growth, FIGURES / "growth.png")
     note = (
         f"Cost against N from {sizes[0]} to {sizes[-1]} points: compiled ~ N^{growth_exponent(sizes, ours):.3f}, "

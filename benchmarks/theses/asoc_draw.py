@@ -48,7 +48,10 @@ def draw_isotropy(effort: Effort) -> None:
     curve = np.array([mean(spread_modules(3), float(r), few) for r in ratios])
     save_figure(
         curve_figure(
-            ratios, curve, FIGURE_9, ("Figure 9: three ASOCs", "split / offset (–)", "mean isotropy (–)")
+            ratios,
+            curve,
+            FIGURE_9,
+            ("Figure 9: three ASOCs", "split / offset (–)", "mean isotropy (–)"),
         ),
         FIGURES / "figure_09.png",
     )
@@ -56,7 +59,10 @@ def draw_isotropy(effort: Effort) -> None:
     curve = np.array([mean(ring(a, 2 * a), 2.0, few) for a in angles])
     save_figure(
         curve_figure(
-            angles, curve, FIGURE_11, ("Figure 11: modules at 0, a, 2a", "a (deg)", "mean isotropy (–)")
+            angles,
+            curve,
+            FIGURE_11,
+            ("Figure 11: modules at 0, a, 2a", "a (deg)", "mean isotropy (–)"),
         ),
         FIGURES / "figure_11.png",
     )

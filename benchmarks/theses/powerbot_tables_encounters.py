@@ -117,8 +117,8 @@ def visits(task: Problem) -> dict[str, tuple[Sensor, list[Visitor]]]:
 def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
     """Experiment 3 in pybullet, closed loop, its obstacles as solid discs; names of the
     pictures."""
-    from trajopt.systems.powerbot.drive_encounter import drive_encounter
     from trajopt.report.style import in_style, save_figure
+    from trajopt.systems.powerbot.drive_encounter import drive_encounter
     from trajopt.systems.powerbot.pictures import replan_figure
 
     FIGURES.mkdir(parents=True, exist_ok=True)

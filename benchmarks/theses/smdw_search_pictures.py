@@ -22,7 +22,13 @@ from matplotlib.patches import Rectangle
 from trajopt.arrays import Array
 from trajopt.report.convergence_picture import draw_band
 from trajopt.report.style import (
-    BLACK, BLUE, GREY, LINE_COLOURS, MOST_LINES, VERMILION, new_figure,
+    BLACK,
+    BLUE,
+    GREY,
+    LINE_COLOURS,
+    MOST_LINES,
+    VERMILION,
+    new_figure,
 )
 
 Box = tuple[tuple[float, float], tuple[float, float]]  # x and y range, m

@@ -14,8 +14,8 @@ from matplotlib.ticker import NullFormatter
 from trajopt.arrays import Array
 from trajopt.bench.profiles import data_profile, ecdf, performance_profile
 from trajopt.bench.tables import BenchTables, Unit
+from trajopt.report.files import FORMATS
 from trajopt.report.style import (
-    FORMATS,
     LINE_COLOURS,
     MOST_LINES,
     first_in_front,

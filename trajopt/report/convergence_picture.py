@@ -133,7 +133,9 @@ def draw_band(axes: Axes, x: Array, values: Array, colour: str, label: str | Non
         np.maximum(values, _FLOOR), (_BAND[0], 50.0, _BAND[1]), axis=1, method="nearest"
     )
     axes.step(x, np.where(np.isfinite(middle), middle, np.nan), where="post", color=colour, label=label)  # fmt: skip
-    top = np.where(np.isfinite(high), high, max(2.0 * np.max(values[np.isfinite(values)], initial=0.0), _FLOOR))
+    top = np.where(
+        np.isfinite(high), high, max(2.0 * np.max(values[np.isfinite(values)], initial=0.0), _FLOOR)
+    )
     shown = np.isfinite(low)
     axes.fill_between(x, low, top, where=shown.tolist(), step="post", color=colour, alpha=0.18, linewidth=0)  # fmt: skip
     return np.array([low, middle, high])

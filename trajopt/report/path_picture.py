@@ -103,9 +103,7 @@ def _poses(solution: Solution, path: Path) -> Array:
     return np.column_stack([path.position(u)[:, :2], path.yaw(u)])
 
 
-def _draw_explored(
-    axes: Axes, solution: Solution, search: OptimizeResult, seen: Array
-) -> None:
+def _draw_explored(axes: Axes, solution: Solution, search: OptimizeResult, seen: Array) -> None:
     """Explored positions of P1 and P2 as dots, fainter the more there are; the legend counts those in the picture,
     around ``seen`` (N, 2), m."""
     names = terminal_objective(solution.problem).names

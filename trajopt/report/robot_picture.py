@@ -82,10 +82,7 @@ def robot_figure(
 
 
 def save_robot_picture(robot: Robot, file: FilePath) -> FilePath:
-    """Write the robot from above as a PNG. Returns ``file``. Raises ArgumentError for another
-    kind."""
-    if file.suffix.lower() != ".png":
-        raise ArgumentError("--out", str(file), "a file that ends in .png")
+    """Write the robot from above, PNG, PDF or SVG. Returns ``file``. Raises ArgumentError for another kind."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with in_style():
         return save_figure(robot_figure(robot), file)

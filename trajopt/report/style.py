@@ -16,11 +16,12 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogFormatter, NullFormatter
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
+from trajopt.report.files import FORMATS
 
 BLACK, GREY, LIGHT = "#000000", "#6b6b6b", "#c9c9c9"
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
@@ -58,7 +59,6 @@ LIMIT_COLOURS: Mapping[str, str] = MappingProxyType(
 )
 _SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed
 
-FORMATS = ("png", "pdf", "svg")
 RESOLUTION = 160  # dots an inch, chosen: sharp on a screen, 1100 pixels for a full-width figure
 WIDTH = 7.0  # inch, the text width of a report
 
@@ -114,12 +114,14 @@ def plain_powers(figure: Figure) -> Figure:
         for axis in (axes.xaxis, axes.yaxis):
             if axis.get_scale() == "log" and isinstance(axis.get_major_formatter(), LogFormatter):
                 low, high = sorted(axis.get_view_interval())
-                axis.set_major_formatter(_power)
-                axis.set_minor_formatter(_power if high < 10.0 * low else NullFormatter())
+                axis.set_major_formatter(FuncFormatter(_power))
+                axis.set_minor_formatter(
+                    NullFormatter() if high > 10.0 * low else FuncFormatter(_power)
+                )
     return figure
 
 
-def _power(value: float, _: int | None = None) -> str:
+def _power(value: float, _: int | None) -> str:
     power = round(np.log10(value)) if value > 0 else 0
     if 1e-3 < value < 1e4 or not np.isclose(value, 10.0**power, rtol=1e-9, atol=0.0):
         return f"{value:g}"

@@ -42,12 +42,16 @@ _SAMPLES = 200  # of a path that is drawn, chosen
 
 
 def report_case(
-    store: Store, prefix: str, folder: str | FilePath, plan: SweepPlan | None = None
+    store: Store,
+    prefix: str,
+    folder: str | FilePath,
+    plan: SweepPlan | None = None,
+    kind: str = "png",
 ) -> list[FilePath]:
     """Write what there is to see of the one case whose identity starts with ``prefix``; returns the
     files.
 
-    ``case.json`` and, for arrays beside the row, ``<name>.csv`` and ``arrays.png``. With ``plan``,
+    ``case.json`` and, for arrays beside the row, ``<name>.csv`` and ``arrays.png`` (pictures are of ``kind``). With ``plan``,
     a finished case of a problem file is solved again (the same seed, so the same result) and gets
     the run folder and the pictures of ``trajopt solve``, and of ``trajopt validate`` where its row
     was driven. Raises StoreError for a case that is not there, ArgumentError for a plan that is
@@ -59,7 +63,7 @@ def report_case(
     if plan is not None:
         case, run = _case(plan, str(row["case"])), plan.run
         if isinstance(run, ProblemRun) and run.func is run_case and row["status"] == DONE:
-            files += _solved_again(run, case, row, place)
+            files += _solved_again(run, case, row, place, kind)
     write_json(
         place / "case.json",
         {
@@ -76,7 +80,7 @@ def report_case(
     if arrays:
         with in_style():
             figure = arrays_figure(arrays, searched=bool(row.get("search")))
-            files.append(save_figure(figure, place / "arrays.png"))
+            files.append(save_figure(figure, place / f"arrays.{kind}"))
     return files
 
 
@@ -136,7 +140,7 @@ def _draw_columns(axes: Axes, table: Array, clock: Array | None) -> None:
 
 
 def _solved_again(
-    run: ProblemRun, case: Case, row: Mapping[str, Any], place: FilePath
+    run: ProblemRun, case: Case, row: Mapping[str, Any], place: FilePath, kind: str
 ) -> list[FilePath]:
     """Run folder and pictures of a case that was solved."""
     solution, report = solve_case(case, run.changed(case))
@@ -148,10 +152,10 @@ def _solved_again(
             "code (see the store's runs/*.json)",
         )
     write_solution(solution, place, seed=seed_of(case), command="trajopt report")
-    files = [place / "summary.json", *save_pictures(solution, place)]
+    files = [place / "summary.json", *save_pictures(solution, place, kind)]
     if report is not None:
         write_validation(report, place, solution.problem.robot)
-        files += save_physics_picture(solution, report, place)
+        files += save_physics_picture(solution, report, place, kind)
     return files
 
 

@@ -83,7 +83,9 @@ def lines(frame: pd.DataFrame, x: str, value: str, by: str | None = None) -> Fig
     first_in_front(axes)
     axes.set_xlabel(with_unit(x))
     axes.set_ylabel(
-        f"{value} (–): share, 95 % interval" if yes_or_no else f"{with_unit(value)}: median, 10-90 %"
+        f"{value} (–): share, 95 % interval"
+        if yes_or_no
+        else f"{with_unit(value)}: median, 10-90 %"
     )
     if by is not None:
         left = len(groups) - len(places_of)

@@ -140,7 +140,7 @@ class Details:
             found["printed"] = {**shown, "ours": ours}
         return found
 
-    def save(self, folder: FilePath, *, pictures: bool) -> None:
+    def save(self, folder: FilePath, *, pictures: str | None) -> None:
         run, where = self.run, self.course
         if run is None or where is None:
             return
@@ -154,7 +154,7 @@ class Details:
             from trajopt.systems.powerbot.pictures import replan_figure
 
             with in_style():
-                save_figure(replan_figure(run, where), folder / "with_encounters.png")
+                save_figure(replan_figure(run, where), folder / f"with_encounters.{pictures}")
 
 
 def details(solution: Solution) -> Details:

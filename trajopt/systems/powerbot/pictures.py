@@ -3,7 +3,6 @@ run."""
 
 from __future__ import annotations
 
-
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -32,9 +31,7 @@ def replan_figure(run: Run, where: Course, *, free: Run | None = None) -> Figure
     speed.set(ylabel="speed (m/s)", title="Replanned motion")
     seen = np.isfinite(run.gap)
     stop = run.v**2 / (2 * np.interp(run.s, where.s, where.braking))
-    gap.plot(
-        run.times, np.where(seen, run.gap, np.nan), color=VERMILION, label="nearest obstacle"
-    )
+    gap.plot(run.times, np.where(seen, run.gap, np.nan), color=VERMILION, label="nearest obstacle")
     gap.plot(run.times, stop, color=GREEN, label="braking distance")
     gap.set(xlabel="time (s)", ylabel="distance (m)", ylim=(0, None))
     for axes in (speed, gap):
