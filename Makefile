@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-slurm check format lines schema pictures clean
+.PHONY: help demo test test-all test-slurm check format lines schema sheet pictures clean
 
 help:  ## what the targets do
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /  -  /'
@@ -49,6 +49,9 @@ schema: $(READY)  ## rewrite the JSON schemas of problem, robot and sweep files
 	$(BIN)/trajopt schema problem --out problems/problem.schema.json
 	$(BIN)/trajopt schema robot --out trajopt/robots/robot.schema.json
 	$(BIN)/trajopt schema sweep --out problems/sweeps/sweep.schema.json
+
+sheet: $(READY)  ## every figure on one sheet, out/contact_sheet.png, to be looked at
+	$(BIN)/python -m benchmarks.contact_sheet
 
 pictures: $(READY)  ## rewrite the pictures of README.md (the climb study's: after its sweep, see benchmarks/readme_pictures.py)
 	$(BIN)/python -m benchmarks.readme_pictures

@@ -432,7 +432,7 @@ def test_folders_of_every_job_stand_alone(tmp_path: Path) -> None:
     )
     solution = trajopt.solve(trajopt.load_problem(file))
     assert solution.holds, solution.faults
-    write_solution(solution, tmp_path / "run", seed=0, pictures=True)
+    write_solution(solution, tmp_path / "run", seed=0, pictures="png")
     assert {"path.png", "profile.png"} <= {f.name for f in (tmp_path / "run").iterdir()}
     assert not (tmp_path / "run" / "convergence.png").exists()
     shutil.move(tmp_path / "run", tmp_path / "elsewhere")

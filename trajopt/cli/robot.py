@@ -30,7 +30,7 @@ def robot(
     ] = None,
     set_: Overrides = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="file for a view from above (*.png)")
+        Path | None, typer.Option("--out", help="file for a view from above (*.png, *.pdf, *.svg)")
     ] = None,
 ) -> None:
     """What a robot is: wheels, mobility, checks, and a view from above."""

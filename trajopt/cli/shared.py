@@ -17,6 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError
+from trajopt.report.files import FORMATS
 from trajopt.report.words import PlainConsole
 
 console = PlainConsole(
@@ -40,6 +41,9 @@ ControlOption = Annotated[
         help="none (planned wheel speeds), servo (planned wheel angles), pose, or pose-and-phase",
     ),
 ]
+FormatOption = Annotated[
+    str | None, typer.Option("--format", help="of pictures: png (default), pdf or svg")
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
@@ -48,6 +52,14 @@ Overrides = Annotated[
         show_default=False,
     ),
 ]
+
+
+def picture_kind(pictures: bool, kind: str | None) -> str | None:
+    """The format of pictures, None where there shall be none. Raises ArgumentError for another format, or one beside
+    --no-pictures."""
+    if kind is not None and (kind not in FORMATS or not pictures):
+        raise ArgumentError("--format", kind, f"one of {', '.join(FORMATS)}, without --no-pictures")
+    return (kind or "png") if pictures else None
 
 
 def overrides(items: list[str] | None) -> dict[str, Any]:

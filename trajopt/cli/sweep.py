@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 from rich.table import Table
 
-from trajopt.cli.shared import console, leaving
+from trajopt.cli.shared import FormatOption, console, leaving, picture_kind
 from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
 from trajopt.report.words import PlainConsole, words
@@ -217,15 +217,17 @@ def report(
         Path | None, typer.Option("--out", help="folder; default: out/report/<case>")
     ] = None,
     store: StoreOption = None,
+    format_: FormatOption = None,
 ) -> None:
     """Draw the pictures of one case out of a sweep, or of a folder that solve wrote, again."""
     from trajopt.sweeps.store import open_store
 
+    kind = picture_kind(True, format_) or "png"
     if not case:
         from trajopt.report.pictures import save_pictures
         from trajopt.report.run_folder import read_solution
 
-        files = list(save_pictures(read_solution(source), out or source))
+        files = list(save_pictures(read_solution(source), out or source, kind))
     else:
         from trajopt.report.sweep_case import report_case
         from trajopt.sweeps.sweepfile import load_sweep
@@ -233,7 +235,7 @@ def report(
         plan = None if source.is_dir() else load_sweep(source)
         place = source if plan is None else store or _default_store(source)
         files = report_case(
-            open_store(place, create=False), case, out or Path("out") / "report" / case, plan
+            open_store(place, create=False), case, out or Path("out") / "report" / case, plan, kind
         )
     for file in files:
         console.print(f"wrote {file}", soft_wrap=True)
@@ -299,7 +301,7 @@ def export(
 @app.command()
 def plot(
     store: StorePath,
-    out: Annotated[Path, typer.Argument(help="picture to write (*.png)")],
+    out: Annotated[Path, typer.Argument(help="picture to write (*.png, *.pdf, *.svg)")],
     value: Annotated[str, typer.Option(help="result to show")] = "",
     x: Annotated[str, typer.Option(help="column along x")] = "",
     y: Annotated[str, typer.Option(help="column along y: a heat map")] = "",

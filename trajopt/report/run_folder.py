@@ -27,6 +27,7 @@ from trajopt.problem.ground import FILES
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import (
     FORMAT,
+    FORMATS,
     as_toml,
     made_folder,
     read_sealed,
@@ -51,7 +52,16 @@ if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
 
 
-_OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png", "view.html")
+_OF_A_CHECK = (
+    "validation.json",
+    "simulated.csv",
+    "engine.png",
+    "view.html",
+    *(f"physics.{kind}" for kind in FORMATS),
+)
+_PICTURES = tuple(
+    f"{name}.{kind}" for name in ("path", "profile", "loads", "convergence") for kind in FORMATS
+)
 _OF_A_SOLUTION = (
     "summary.json",
     "problem.toml",
@@ -59,10 +69,7 @@ _OF_A_SOLUTION = (
     "timing.csv",
     "history.csv",
     "explored.npz",
-    "path.png",
-    "profile.png",
-    "loads.png",
-    "convergence.png",
+    *_PICTURES,
 )
 _TABLES = {  # columns that are read back, and those of them that may hold gaps
     "timing.csv": (("u", "s_m", "s_dot_m_s", "s_ddot_m_s2"), ("s_ddot_m_s2",)),
@@ -76,7 +83,7 @@ def write_solution(
     *,
     seed: int,
     command: str | None = None,
-    pictures: bool = False,
+    pictures: str | None = None,
 ) -> FilePath:
     """Write a solution into ``folder`` (made if needed; an earlier run's files are replaced) and
     return it.
@@ -84,7 +91,7 @@ def write_solution(
     ``summary.json`` comes last, so a folder with one is complete; it holds checksums of the others
     (but pictures) and of itself. Equal seeds and budgets in evaluations give equal bytes there
     outside the keys "run" and "checksum". Without a trajectory there is no trajectory.csv and
-    timing.csv. ``pictures`` draws them too. Raises ArgumentError where the folder cannot be
+    timing.csv. ``pictures`` is the format in which they are drawn too. Raises ArgumentError where the folder cannot be
     written, or holds files of these names that no run wrote.
     """
     place, search, problem = made_folder(folder), solution.search, solution.problem
@@ -115,7 +122,7 @@ def write_solution(
         from trajopt.report.pictures import save_pictures
         from trajopt.report.viewer.motion_page import write_view
 
-        save_pictures(solution, place)
+        save_pictures(solution, place, pictures)
         write_view(solution, place)
     summary = solution_summary(solution, seed=seed)
     summary["run"] = {
@@ -126,7 +133,7 @@ def write_solution(
         "wall_time_s": solution.wall_time,
         "search_time_s": None if search is None else search.seconds,
         "files": checksums(
-            place, [*(n for n in _OF_A_SOLUTION if not n.endswith(".png")), *names.values()]
+            place, [*(n for n in _OF_A_SOLUTION if n not in _PICTURES), *names.values()]
         ),
     }
     write_sealed(place / "summary.json", summary)
