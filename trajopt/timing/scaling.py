@@ -9,18 +9,21 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, as_numbers, require_not_negative
+from trajopt.arrays import Array, as_numbers, require_not_negative, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit, is_linear
 from trajopt.paths.path import Path
 from trajopt.paths.samples import require_moving
 from trajopt.robots.robot import Robot
+from trajopt.timing.cells import Measure, Readable
 from trajopt.timing.compiled import forward_profile
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
+from trajopt.timing.fastest import Ask, Stuck, fastest
 from trajopt.timing.feasibility import require_motion
-from trajopt.timing.grid import MOST_REFINED, initial_grid, insert, split
+from trajopt.timing.grid import MOST_REFINED, graded_grid, initial_grid, insert, placed, split
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
+from trajopt.timing.planar import source_of
 from trajopt.timing.rests import AT, with_rests
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
@@ -35,6 +38,7 @@ REFINE_ABOVE = (
 REFINE_ROUNDS = 4  # rounds spent on that; chosen
 MOST_ROUNDS = 16  # rounds before giving up on a violation above the largest slow-down; chosen
 LARGEST_SLOWDOWN = 1.001  # of time; chosen
+_TRIALS = 3  # grids where a motion exists but is not found; chosen
 _KEPT = 1e-9  # relative violation that counts as none
 _TIGHTER = (
     0.0,
@@ -76,6 +80,7 @@ def time_scale(
     too_fast: Literal["refuse", "brake"] = "refuse",
     start_wheels: ArrayLike = (),
     start_steering: Mapping[str, float] | None = None,
+    gap: float | None = 1e-3,
 ) -> Trajectory:
     """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s',
     m/s).
@@ -111,6 +116,8 @@ def time_scale(
     """
     speeds, start = (start_speed, end_speed), (start_wheels, start_steering)
     job = _job(path, limits, robot, ground, speeds, engine, stops, start)
+    if gap is not None:
+        require_positive("gap", gap, "(a share of the duration), or None")
     u = insert(job.path, initial_grid(job.path, gridpoints), job.stops)
     rests = job.stops if start_speed > 0 or engine == "linear" else np.append(job.stops, 0.0)
     job = replace(job, track=with_rests(job.track, job.limits, u, rests))
@@ -128,6 +135,10 @@ def time_scale(
         raise ArgumentError("too_fast", too_fast, "refuse or brake")
     if engine == "linear":
         return _linear(job, fine_rows(job.track, u, job.limits))
+    if engine in ("auto", "compiled") and all(is_linear(limit) for limit in job.limits):
+        return _second_order(
+            job, speeds, gridpoints, gap, u if job.limits != tuple(limits) else u[:0]
+        )
     for tighter in _TIGHTER:
         fine, sd2, worst, name = _refined(job, u, tighter)
         factor = max(1.0, worst)
@@ -141,6 +152,64 @@ def time_scale(
         f"it is broken by {-slack.min():.2g} of "
         "its size, and slowing down does not help (rest breaks it, or nearly)",
     )
+
+
+def _second_order(
+    job: _Job,
+    speeds: tuple[float, float],
+    gridpoints: int | ArrayLike | None,
+    gap: float | None,
+    also: Array,
+) -> Trajectory:
+    """The fastest motion on a graded grid, with gridpoints ``also`` (spline parameters)."""
+    path, along = job.path, job.track
+    measure = Measure.of(along)
+    knots = np.asarray(path.basis.knots)
+    source = source_of(along, measure, job.limits)
+    edges = np.zeros(0)
+    if isinstance(source, Readable):  # limits may have places where they jump
+        edges = np.asarray(source.edges(along), dtype=np.float64)
+    edges = edges[(edges > 0) & (edges < path.length)]
+    wanted = np.concatenate([path.locate(np.append(job.stops, edges)), along.rests, also])
+    u, kept = placed(graded_grid(measure, gridpoints), wanted, knots)
+    ask = Ask(along, job.limits, *speeds, kept[: len(job.stops)], gap)
+    jumps = np.concatenate([knots, kept])
+    for done in range(_TRIALS):
+        try:
+            found = fastest(ask, source, u, jumps)
+            break
+        except Stuck:
+            _refuse(job, u)
+            if done == _TRIALS - 1:
+                raise InfeasibleError(
+                    job.limits[0].name, 0.0, "no profile was found on any grid"
+                ) from None
+            u = np.sort(np.concatenate([u, (u[:-1] + u[1:]) / 2]))
+    profile = found.profile
+    s = path.parameter(profile.u)
+    g, _ = measure.stretch(profile.u)
+    sd = np.sqrt(profile.y) / g
+    return Trajectory(
+        path,
+        job.limits,
+        along.robot,
+        along.ground,
+        profile.u,
+        s,
+        sd,
+        np.diff(sd**2) / (2 * np.maximum(np.diff(s), 1e-300)),
+        "compiled",
+        found.slowdown,
+        job.start_wheels,
+        along.start_steering,
+        profile,
+        found.bound,
+    )
+
+
+def _refuse(job: _Job, u: Array) -> None:
+    """Raises InfeasibleError with the limit that forbids every motion on the grid u, and where."""
+    _fastest(job, _with_edges(job, u), 0.0)
 
 
 def rough_duration(

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, IndexArray, as_numbers
+from trajopt.arrays import Array, BoolArray, IndexArray, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
@@ -19,6 +19,7 @@ from trajopt.robots.robot import Robot
 from trajopt.robots.steering import steering_of
 from trajopt.shown import Shown
 from trajopt.timing.energy import energies
+from trajopt.timing.profile import Profile, margins_of
 from trajopt.timing.rests import Rest, rests_of
 from trajopt.timing.stages import Check, check, fine_rows
 from trajopt.timing.track import Track
@@ -79,6 +80,8 @@ class Trajectory(Shown):
     slowdown: float
     start_wheels: Array = field(default_factory=lambda: np.zeros(0))  # (W,) rad; () means zeros
     start_steering: Mapping[str, float] = field(default_factory=dict)  # rad, see ``time_scale``
+    profile: Profile | None = None  # in the cells, where s'' is not constant there
+    bound: float | None = None  # s, which no motion that keeps the limits beats; None: unknown
 
     def __post_init__(self) -> None:
         count = 0 if self.robot is None else len(self.robot.wheels)
@@ -104,10 +107,11 @@ class Trajectory(Shown):
     @cached_property
     def times(self) -> Array:
         """(N+1,): times at which the robot leaves the gridpoints, s."""
-        moving = np.concatenate(
-            [[0.0], np.cumsum(2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:]))]
-        )
-        return np.asarray(moving + np.cumsum(self.waits))
+        if self.profile is None:
+            seconds = 2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:])
+        else:
+            seconds = self.profile.seconds
+        return np.asarray(np.concatenate([[0.0], np.cumsum(seconds)]) + np.cumsum(self.waits))
 
     @cached_property
     def rests(self) -> tuple[Rest, ...]:
@@ -146,15 +150,34 @@ class Trajectory(Shown):
         robot's file. Raises ArgumentError for robots whose torques are not known."""
         return float(self.energies[-1])
 
+    @property
+    def gap(self) -> float | None:
+        """How far the duration can be from the least possible, at most, as a share of it; None
+        where no bound was asked for."""
+        return None if self.bound is None else max(0.0, 1.0 - self.bound / self.duration)
+
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,
         duration]."""
         i, after, node, _ = self._placed(t)
-        s = self.s[i] + after * (self.sd[i] + after * self.sdd[i] / 2)
-        speed = np.maximum(self.sd[i] + self.sdd[i] * after, 0.0)
-        waits = node >= 0
-        speed, sdd = np.where(waits, 0.0, speed), np.where(waits, 0.0, self.sdd[i])
-        return np.clip(s, self.s[i], self.s[i + 1]), speed, sdd
+        _, s, speed, sdd = self._moving(i, after, node >= 0)
+        return s, speed, sdd
+
+    def _moving(
+        self, i: IndexArray, after: Array, waits: BoolArray
+    ) -> tuple[Array, Array, Array, Array]:
+        """(N,) each: spline parameter, s, s' and s'' so long after intervals were entered."""
+        if self.profile is not None:
+            u, speed, pull = self.profile.along(i, after)
+            g, slope = self.profile.measure.stretch(u)
+            speed = speed / g
+            s, sdd = self.path.parameter(u), (pull - slope * speed**2) / g
+        else:
+            s = self.s[i] + after * (self.sd[i] + after * self.sdd[i] / 2)
+            s = np.clip(s, self.s[i], self.s[i + 1])
+            u, sdd = self.path.locate(s), self.sdd[i]
+            speed = np.maximum(self.sd[i] + sdd * after, 0.0)
+        return u, s, np.where(waits, 0.0, speed), np.where(waits, 0.0, sdd)
 
     def _placed(self, t: ArrayLike) -> tuple[IndexArray, Array, IndexArray, Array]:
         """At times t (N,): which interval between gridpoints and the time since it was entered; the
@@ -175,9 +198,10 @@ class Trajectory(Shown):
     def at(self, t: ArrayLike) -> State:
         """State at times t (N,) or one time (N = 1), s. Raises ArgumentError outside [0,
         duration]."""
-        (i, _, node, since), (s, speed, _) = self._placed(t), self.along(t)
+        i, after, node, since = self._placed(t)
+        found, s, speed, _ = self._moving(i, after, node >= 0)
         inside = np.where(i + 2 < len(self.u), np.nextafter(self.u[i + 1], -np.inf), self.u[-1])
-        u = np.clip(self.path.locate(s), self.u[i], inside)
+        u = np.clip(found, self.u[i], inside)
         u = np.where(node >= 0, self.u[node], u)
         samples = self.track.samples(s, u)
         table_u, table_yaw = self._yaw_table
@@ -208,8 +232,8 @@ class Trajectory(Shown):
         )
 
     def margins(self) -> Mapping[str, float]:
-        """Least relative margin of every limit, recomputed on a grid ten times finer than the
-        solver's."""
+        """Least relative margin of every limit, recomputed at the ends and quarters of the cells,
+        which are small where the motion varies (or on a grid ten times finer than the solver's)."""
         least = self._check.slack.min(axis=0)
         return MappingProxyType(
             {limit.name: float(m) for limit, m in zip(self.limits, least, strict=True)}
@@ -239,6 +263,8 @@ class Trajectory(Shown):
 
     @cached_property
     def _check(self) -> Check:
+        if self.profile is not None:
+            return margins_of(self.track, self.profile, self.limits)
         return check(fine_rows(self.track, self.u, self.limits, self.sd**2), self.sd**2)
 
     @cached_property
