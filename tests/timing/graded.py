@@ -59,30 +59,28 @@ class Sampled:
     turn: np.ndarray  # yaw acceleration
 
 
-def worst(trajectory: Trajectory, limit: object, a_cell: int = 3) -> float:
+def worst(trajectory: Trajectory, limit: object) -> float:
     """The largest share of a limit that the motion uses; 1 is all of it.
 
-    Differences over a sixth of a cell, which no jump of the acceleration falls into. Where those
-    over a bit more tell something else, digits of the poses run out (a turn in 1e-8 m), and
-    differences over some milliseconds count as well.
+    At the middle and the quarters of every cell, by differences inside the cell, which no jump of
+    the acceleration falls into. Places where differences over three lengths do not agree tell
+    nothing: there the digits of poses run out (a turn within 1e-8 m).
     """
     trajectory = replace(trajectory, robot=None, limits=(), start_wheels=np.zeros(0))  # poses alone
-    width = np.repeat(np.diff(trajectory.times), a_cell) / (6 * a_cell)
-    fine, wider, long = (
-        used(limit.name, sampled(trajectory, h, a_cell), limit)
-        for h in (width, 1.3 * width, np.maximum(width, 8e-3))
-    )
-    sure = np.abs(fine - wider) < 2e-5
-    return float(np.where(sure, fine, np.minimum(np.minimum(fine, wider), long)).max())
+    found = 0.0
+    for share, reach in ((0.25, 8.4), (0.5, 4.2), (0.75, 8.4)):
+        values = np.stack(
+            [used(limit.name, sampled(trajectory, share, k / reach), limit) for k in (1, 0.8, 0.6)]
+        )
+        sure = np.ptp(values, axis=0) < 1e-5
+        found = max(found, float(values[0][sure].max(initial=0.0)))
+    return found
 
 
-def sampled(trajectory: Trajectory, h: np.ndarray, a_cell: int) -> Sampled:
-    """At ``a_cell`` places in each cell of the profile, whatever its size, by differences over h."""
+def sampled(trajectory: Trajectory, share: float, reach: float) -> Sampled:
+    """At ``share`` of every cell's time, by differences over ``reach`` of it."""
     width = np.diff(trajectory.times)
-    share = (np.arange(a_cell) + 0.5) / a_cell
-    middle = (trajectory.times[:-1, None] + width[:, None] * share).ravel()
-    h = np.minimum(h, trajectory.duration / 8)
-    middle = np.clip(middle, 2 * h, trajectory.duration - 2 * h)
+    middle, h = trajectory.times[:-1] + width * share, width * reach
     pose = trajectory.at((middle[:, None] + h[:, None] * np.arange(-2, 3)).ravel()).pose
     pose = pose.reshape(len(middle), 5, 3)
     pose = pose - pose[:, 2:3] * [1.0, 1.0, 0.0]  # far coordinates keep their digits

@@ -148,7 +148,7 @@ def random_case(rng: np.random.Generator):
     elif kind < 0.7:
         points = np.cumsum(rng.normal(0, 1, (count, 2)) + np.array([0.8, 0]), axis=0)
     elif kind < 0.85:
-        points = np.array(lane(10 ** rng.uniform(-8, -0.5)))
+        points = np.array(lane(10 ** rng.uniform(-5, -0.5)))
     else:
         points = np.column_stack([np.arange(count), 1e-2 * rng.normal(0, 1, count)])
     points = points * size + rng.choice([0.0, 1e3]) * (kind < 0.7)
