@@ -154,7 +154,7 @@ class Cells:
     @cached_property
     def cap(self) -> Array:
         """(P,): the least bound on sigma'^2."""
-        return np.minimum(self.table.bounds.min(axis=0), SD2_CAP)
+        return np.asarray(np.minimum(self.table.bounds.min(axis=0), SD2_CAP))
 
 
 _QUARTERS = np.array([0.25, 0.5, 0.75])

@@ -193,7 +193,9 @@ def _planar(limits: tuple[Limit, ...], robot: Robot | None) -> Planar | None:
     speeds = np.concatenate([block.speeds for block in blocks])
     speed_owner = np.repeat(np.arange(len(limits)), [len(block.speeds) for block in blocks])
     found = Planar(limits, robot, tuple(blocks), owner, speeds, speed_owner)
-    return found if not castors or _agrees(found, robot) else None
+    if castors and robot is not None and not _agrees(found, robot):
+        return None
+    return found
 
 
 def _agrees(planar: Planar, robot: Robot) -> bool:
@@ -219,7 +221,7 @@ def _block(limit: Limit, robot: Robot | None, castors: bool) -> Block | None:
     speeds = _speeds(limit, robot)
     if speeds is not None:
         return Block(none, np.zeros((0, 7)), np.zeros(0), speeds)
-    if type(limit) not in _CONSTANT or getattr(limit, "edges", ()):
+    if type(limit) not in _CONSTANT:
         return None
     if isinstance(limit, Slip) and not isinstance(limit.friction, (int, float, tuple)):
         return None
