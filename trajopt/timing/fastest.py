@@ -117,10 +117,10 @@ def _kept(ask: Ask, cells: Cells) -> tuple[_Solved, float, BoolArray]:
         solved = _solve(ask, cells, tighter)
         worst = max(1.0, float(solved.factor.max()))
         if np.isfinite(worst):
-            slow = replace(
-                solved, y=solved.y / worst, first=solved.first / worst, last=solved.last / worst
-            )
-            left, _ = _excess(cells, slow.y, slow.first, slow.last)
+            if cells.table.c.min(initial=1.0) > 0:  # what rest keeps, slowing down keeps
+                break
+            y, first, last = (m / worst for m in (solved.y, solved.first, solved.last))
+            left, _ = _excess(cells, y, first, last)
             if left.max() <= _KEPT:
                 break
             worst = np.inf
@@ -241,23 +241,22 @@ def _excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]
     that removes that."""
     from trajopt.timing import reach
 
-    over, factor = np.zeros(len(cells.d)), np.ones(len(cells.d))
-    for k in range(5):
-        places = cells.right if k == 4 else cells.left + k
-        reach.excess(
-            cells.d,
-            places,
-            k / 4,
-            cells.table.a,
-            cells.table.b,
-            cells.table.c,
-            cells.cap,
-            y,
-            u0,
-            u1,
-            over,
-            factor,
-        )
+    over, factor = np.empty(len(cells.d)), np.empty(len(cells.d))
+    table = cells.table
+    reach.excess(
+        cells.d,
+        cells.left,
+        cells.right,
+        table.a,
+        table.b,
+        table.c,
+        cells.cap,
+        y,
+        u0,
+        u1,
+        over,
+        factor,
+    )
     return over, factor
 
 

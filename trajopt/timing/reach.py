@@ -306,8 +306,8 @@ def forward(
 @kernel(nogil=True)
 def excess(
     d: Array,
-    places: IndexArray,
-    share: float,
+    left: IndexArray,
+    right: IndexArray,
     a: Array,
     b: Array,
     c: Array,
@@ -318,22 +318,23 @@ def excess(
     over: Array,
     factor: Array,
 ) -> None:
-    """Raises over (N,), the share of a row's scale (or of the bound ``cap`` on y) by which each cell
-    breaks it at ``share`` of its length, and factor (N,), what y would have to be divided by."""
+    """Fills over (N,), the share of a row's scale (or of the bound ``cap`` on y) by which each cell
+    breaks it at its ends and quarters, and factor (N,), what y would have to be divided by."""
     for i in range(len(d)):
-        j, h = places[i], d[i]
-        u = u0[i] + share * (u1[i] - u0[i])
-        here = max(y[i] + share * h * (u0[i] + u), 0.0)
-        worst, most = over[i], factor[i]
-        if here > cap[j]:
-            ratio = here / cap[j] if cap[j] > 0 else np.inf
-            worst, most = max(worst, ratio - 1), max(most, ratio)
-        for r in range(a.shape[1]):
-            used = a[j, r] * u + b[j, r] * here
-            if used - c[j, r] > worst:
-                worst = used - c[j, r]
-            if used > most * c[j, r] and c[j, r] > 0:
-                most = used / c[j, r]
+        worst, most = 0.0, 1.0
+        for k in range(5):
+            j = right[i] if k == 4 else left[i] + k
+            u = u0[i] + k / 4 * (u1[i] - u0[i])
+            here = max(y[i] + k / 4 * d[i] * (u0[i] + u), 0.0)
+            if here > cap[j]:
+                ratio = here / cap[j] if cap[j] > 0 else np.inf
+                worst, most = max(worst, ratio - 1), max(most, ratio)
+            for r in range(a.shape[1]):
+                used = a[j, r] * u + b[j, r] * here
+                if used > c[j, r]:
+                    worst = max(worst, used - c[j, r])
+                    if c[j, r] > 0:
+                        most = max(most, used / c[j, r])
         over[i], factor[i] = worst, most
 
 

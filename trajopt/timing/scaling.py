@@ -89,9 +89,12 @@ def time_scale(
     parameters are arc lengths in space); a path in space must lie on it. Without ground, or with
     ``Flat``, the path itself is the ground, level across its direction.
 
-    ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast
-    pass, where only s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are
-    slower motions: "linear" ([waheed2006]: one factor for the whole motion, uniform in the spline
+    ``engine``: "auto" and "compiled" are of second order: s'' is linear between gridpoints, which lie
+    where the motion varies. The motion is checked inside every cell, and a lower bound on the time of
+    any motion that keeps the limits stands beside it: the grid is refined until both are within
+    ``gap`` of the duration, if that can be reached (``Trajectory.gap`` tells; None: no bound is made).
+    "bounds" (only where s' and s'' alone are bounded) and "toppra" hold s'' constant between evenly
+    spread gridpoints. Two more are slower motions: "linear" ([waheed2006]: one factor for the whole motion, uniform in the spline
     parameter, with the end speeds that the path gives it, so start and end speed must stay 0) and
     "segments" (below the speed of a factor for each spline segment). ``gridpoints``: how many, or
     path parameters (m); more are added where limits are broken between them. ``stops``: path
@@ -118,6 +121,12 @@ def time_scale(
     job = _job(path, limits, robot, ground, speeds, engine, stops, start)
     if gap is not None:
         require_positive("gap", gap, "(a share of the duration), or None")
+    if too_fast not in ("refuse", "brake"):
+        raise ArgumentError("too_fast", too_fast, "refuse or brake")
+    second_order = engine in ("auto", "compiled") and all(map(is_linear, job.limits))
+    if second_order and not job.track.steers and too_fast == "refuse" and _drives_anywhere(job):
+        require_moving(job.path)
+        return _second_order(job, speeds, gridpoints, gap, np.zeros(0))
     u = insert(job.path, initial_grid(job.path, gridpoints), job.stops)
     rests = job.stops if start_speed > 0 or engine == "linear" else np.append(job.stops, 0.0)
     job = replace(job, track=with_rests(job.track, job.limits, u, rests))
@@ -131,11 +140,9 @@ def time_scale(
                 job.start,
             ),
         )
-    elif too_fast not in ("refuse", "brake"):
-        raise ArgumentError("too_fast", too_fast, "refuse or brake")
     if engine == "linear":
         return _linear(job, fine_rows(job.track, u, job.limits))
-    if engine in ("auto", "compiled") and all(is_linear(limit) for limit in job.limits):
+    if second_order:
         return _second_order(
             job, speeds, gridpoints, gap, u if job.limits != tuple(limits) else u[:0]
         )
@@ -179,7 +186,7 @@ def _second_order(
             found = fastest(ask, source, u, jumps)
             break
         except Stuck:
-            _refuse(job, u)
+            _refuse(job, insert(path, initial_grid(path, gridpoints), job.stops))
             if done == _TRIALS - 1:
                 raise InfeasibleError(
                     job.limits[0].name, 0.0, "no profile was found on any grid"
@@ -280,6 +287,18 @@ def _job(
     wheels = as_numbers("start_wheels", start[0], "wheel angles, rad")
     squares = speeds[0] ** 2, speeds[1] ** 2
     return _Job(along, tuple(limits), *squares, places, engine, wheels)
+
+
+def _drives_anywhere(job: _Job) -> bool:
+    """Whether the robot's wheels allow every twist of a path of this kind, on level ground."""
+    if not (job.track.ground.level and job.path.plain):
+        return False
+    robot = job.track.robot
+    if robot is None:
+        return True
+    free = robot.drivable
+    needed = np.eye(3) if job.path.heading is not None else np.eye(3)[[0, 2]]
+    return bool(np.allclose(needed @ free @ free.T, needed, atol=1e-9))
 
 
 def _require_drivable(job: _Job, u: Array) -> None:
