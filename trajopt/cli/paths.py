@@ -37,7 +37,7 @@ def explain(
         words(
             (str(plan), "bold"),
             f": {trajectory.duration:.4f} s over {trajectory.path.length:.3f} m "
-            f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e})",
+            f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e}{_near(trajectory)})",
         )
     )
     stretches = Table(box=box.SIMPLE_HEAD, pad_edge=False)
@@ -133,3 +133,9 @@ def _timed(plan: Path, set_: list[str] | None, engine: str) -> Trajectory:
             "plan", str(plan), "a problem with a feasible motion; " + solution.status
         )
     return solution.trajectory
+
+
+def _near(trajectory: Trajectory) -> str:
+    """How far above the least time the duration can be."""
+    gap = trajectory.gap
+    return "" if gap is None else f", at most {100 * gap:.2g} % above the least time"

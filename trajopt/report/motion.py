@@ -162,10 +162,18 @@ def column(wheel: str, quantity: str) -> str:
 
 def timing_table(trajectory: Trajectory) -> dict[str, Array]:
     """Gridpoints of the speed profile; s'' belongs to the interval after a gridpoint, so the last
-    has none."""
-    return {
+    has none. Where it is not constant there, the motion is told by sigma' and by sigma'' at both
+    ends of the interval (sigma: ``timing/spread.py``)."""
+    table = {
         "u": trajectory.u,
         "s_m": trajectory.s,
         "s_dot_m_s": trajectory.sd,
         "s_ddot_m_s2": np.append(trajectory.sdd, np.nan),
     }
+    profile = trajectory.profile
+    empty = np.full(len(trajectory.u), np.nan)
+    table["sigma_dot_squared_m2_s2"] = empty if profile is None else profile.y
+    for end in ("first", "last"):
+        pull = empty if profile is None else np.append(getattr(profile, end), np.nan)
+        table[f"sigma_ddot_{end}_m_s2"] = pull
+    return table
