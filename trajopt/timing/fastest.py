@@ -1,10 +1,9 @@
 """The fastest profile on a graded grid, checked inside every cell, with a bound on what is left.
 
-A cell's rows hold at its ends by construction (``timing/reach.py``) and are checked at its
-quarters. Where one is broken by much, the cell takes constant u; where by little, its rows are
-tightened by that; what is left after some rounds is removed by slowing the whole motion. Beside it
-stands a lower bound on the time of any motion (``timing/relaxed.py``); cells where the two differ
-most are split until the difference is below what is asked for.
+A cell's rows hold at its ends by construction (``timing/reach.py``) and are checked at its quarters.
+Where one is broken by much, the cell takes constant u; where by little, its rows are tightened; what
+is left is removed by slowing the whole motion. Beside it stands a lower bound on the time of any
+motion (``timing/relaxed.py``); cells where the two differ most are split until they are near.
 """
 
 from __future__ import annotations
@@ -130,7 +129,7 @@ def _kept(ask: Ask, cells: Cells) -> tuple[_Solved, float, BoolArray]:
 
 def _solve(ask: Ask, cells: Cells, tighter: float) -> _Solved:
     """Solved and re-solved with what the check between the gridpoints found."""
-    from trajopt.timing import reach
+    from trajopt.timing import ranges, reach
 
     count = len(cells.d)
     tight = np.full(len(cells.places), tighter)
@@ -144,7 +143,7 @@ def _solve(ask: Ask, cells: Cells, tighter: float) -> _Solved:
         top, bottom = np.full(len(cap), np.inf), np.zeros(len(cap))
         rests = np.empty(len(cap), dtype=np.bool_)
         if (
-            reach.ceilings(cells.solved, cells.table.a, cells.table.b, c, cap, top, bottom, rests)
+            ranges.ceilings(cells.solved, cells.table.a, cells.table.b, c, cap, top, bottom, rests)
             >= 0
         ):
             if best is None:
@@ -262,11 +261,11 @@ def _excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]
 
 def _bound(ask: Ask, cells: Cells) -> tuple[float, Array]:
     """Least time of any motion, s, and each cell's share of it."""
-    from trajopt.timing import reach, relaxed
+    from trajopt.timing import ranges, relaxed
 
     top, bottom = np.empty(len(cells.places)), np.empty(len(cells.places))
     rests = np.empty(len(top), dtype=np.bool_)
-    reach.ceilings(
+    ranges.ceilings(
         cells.solved, cells.table.a, cells.table.b, cells.table.c, cells.cap, top, bottom, rests
     )
     start, end = _ends(ask, cells)

@@ -120,7 +120,7 @@ class Planar:
         """(P, K, 2): contacts from the foot of the centre of gravity, where castors move them."""
         if self.robot is None or not any(block.moving for block in self.blocks):
             return None
-        from trajopt.timing import planar_kernel as kernels
+        from trajopt.timing import swivel_kernel as kernels
 
         steering = steering_of(self.robot)
         castors = steering.castors
