@@ -149,7 +149,9 @@ class Cells:
     @cached_property
     def solved(self) -> IndexArray:
         """Places at the ends and in the middles of cells, ascending."""
-        return np.unique(np.concatenate([self.left, self.middle, self.right]))
+        kept = np.ones(len(self.places), dtype=np.bool_)
+        kept[self.left + 1] = kept[self.left + 3] = False
+        return np.flatnonzero(kept)
 
     @cached_property
     def cap(self) -> Array:

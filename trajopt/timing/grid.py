@@ -75,7 +75,8 @@ def graded_grid(measure: Measure, gridpoints: int | ArrayLike | None) -> Array:
     cells = wanted if gridpoints is None else gridpoints - 1.0
     least = 2 if gridpoints is None else 1
     knots = measure.cubics[0]
-    return np.unique(spread.spread(knots, left, share, segment, float(cells), least))
+    u = spread.spread(knots, left, share, segment, float(cells), least)
+    return np.asarray(u[np.concatenate([[True], np.diff(u) > 0])])
 
 
 def placed(u: Array, wanted: Array, knots: Array) -> tuple[Array, Array]:
