@@ -118,17 +118,14 @@ def limit_use(trajectory: Trajectory) -> tuple[Array, Array]:
     A share of 1 is all of the limit, more is broken. From the limits' own rows: 1 minus the
     relative margin, as ``Trajectory.margins`` defines it.
     """
-    u, sdd = trajectory.u, trajectory.sdd
-    shares = np.zeros((len(_INSIDE), len(sdd), len(trajectory.limits)))
-    times = np.empty((len(_INSIDE), len(sdd), 1))
+    moving = np.diff(trajectory.times) - trajectory.waits[1:]
+    shares = np.zeros((len(_INSIDE), len(moving), len(trajectory.limits)))
+    times = np.empty((len(_INSIDE), len(moving), 1))
     for j, part in enumerate(_INSIDE):
-        here = u[:-1] + part * np.diff(u)
-        s = trajectory.path.parameter(here)
-        sd2 = np.maximum(trajectory.sd[:-1] ** 2 + 2 * sdd * (s - trajectory.s[:-1]), 0.0)
-        times[j, :, 0] = trajectory.times[:-1] + 2 * (s - trajectory.s[:-1]) / (
-            trajectory.sd[:-1] + np.sqrt(sd2)
-        )
-        samples = replace(trajectory.track.samples(s, here), sd2=sd2)
+        times[j, :, 0] = trajectory.times[:-1] + part * moving
+        u, s, speed, sdd = trajectory.inside(part)
+        sd2 = speed**2
+        samples = replace(trajectory.track.samples(s, u), sd2=sd2)
         for k, limit in enumerate(trajectory.limits):
             rows = limit.rows(samples, trajectory.robot)
             with np.errstate(divide="ignore", invalid="ignore"):

@@ -194,11 +194,13 @@ class Readable:
 
     limits: tuple[Limit, ...]
 
-    def edges(self, track: Track) -> tuple[float, ...]:
-        """Path parameters where the limits jump or bend, m."""
-        path = track.path
-        u = np.array([path.start, np.nextafter(path.end, -np.inf)])
-        return assemble(track.samples(path.parameter(u), u), self.limits, track.robot).edges
+    def edges(self, track: Track, u: Array) -> tuple[float, ...]:
+        """Path parameters where the limits jump or bend, m, seen from the grid u (N+1,) and four
+        times as many places."""
+        parts = u[:-1, None] + np.diff(u)[:, None] * [0.0, 0.25, 0.5, 0.75]
+        places = np.append(parts.ravel(), np.nextafter(u[-1], -np.inf))
+        s = track.path.parameter(places)
+        return assemble(track.samples(s, places), self.limits, track.robot).edges
 
     def table(self, track: Track, measure: Measure, spots: Spots) -> Table:
         """Raises InfeasibleError where the path turns too sharply for rows per unit of s."""

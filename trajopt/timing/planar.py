@@ -32,6 +32,7 @@ from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.limits.wheel_torque import WheelTorque
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
@@ -43,7 +44,7 @@ from trajopt.timing.track import Track
 
 _PLACES = 24  # made up: half to read the matrices off, half to try them; chosen
 _AGREE = 1e-10  # of a row's scale: how well rows agree there
-_CONSTANT = (Acceleration, Contact, Slip, Tip, WheelAcceleration)  # with rigid wheels
+_CONSTANT = (Acceleration, Contact, Slip, Tip, WheelAcceleration, WheelTorque)  # rigid wheels
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +211,9 @@ def _agrees(planar: Planar, robot: Robot) -> bool:
     rows = assemble(replace(samples, wheel_states=lambda: states), planar.limits, robot)
     ours = planar.rows(features, np.ascontiguousarray(states.contacts - cog[:2]))
     return all(
-        np.allclose(np.sort(o[k]), np.sort(m[k]), rtol=0, atol=_AGREE * max(1, np.abs(m[k]).max()))
+        np.allclose(
+            np.sort(o[k]), np.sort(m[k]), rtol=0, atol=_AGREE * np.abs(m[k]).max(initial=1.0)
+        )
         for o, m in zip(ours, (rows.a, rows.b, rows.c), strict=True)
         for k in range(_PLACES)
     )
@@ -225,9 +228,9 @@ def _block(limit: Limit, robot: Robot | None, castors: bool) -> Block | None:
         return None
     if isinstance(limit, Slip) and not isinstance(limit.friction, (int, float, tuple)):
         return None
-    if castors and isinstance(limit, (Slip, Tip, Contact)):
+    if castors and isinstance(limit, (Slip, Tip, Contact, WheelTorque)):
         assert robot is not None
-        if isinstance(limit, Contact):
+        if isinstance(limit, (Contact, WheelTorque)):
             return None
         if isinstance(limit, Slip) and (limit.per_wheel or not holds_of(robot).all_drive):
             return None

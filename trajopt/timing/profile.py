@@ -12,7 +12,6 @@ from trajopt.arrays import Array, IndexArray
 from trajopt.limits.limit import Limit
 from trajopt.timing.cells import Measure, cells_of
 from trajopt.timing.planar import source_of
-from trajopt.timing.stages import Check
 from trajopt.timing.track import Track
 
 
@@ -71,27 +70,15 @@ class Profile:
         return self.measure.path.parameter(self.u)
 
 
-def margins_of(track: Track, profile: Profile, limits: Sequence[Limit]) -> Check:
-    """Least relative margins in every cell, at its ends (from inside) and quarters."""
+def margins_of(track: Track, profile: Profile, limits: Sequence[Limit]) -> Array:
+    """(N, L): least relative margin of every limit in every cell, at its ends (from inside) and
+    quarters and where a parabola through these is highest."""
+    from trajopt.timing import reach
+
     source = source_of(track, profile.measure, limits)
     cells = cells_of(track, profile.measure, profile.u, source, profile.u)
-    shape = (len(profile.d), len(cells.table.names))
-    slack, factor = np.ones(shape), np.ones(len(profile.d))
-    for k in range(5):
-        j = cells.right if k == 4 else cells.left + k
-        u = profile.first + k / 4 * (profile.last - profile.first)
-        y = np.maximum(profile.y[:-1] + k / 4 * profile.d * (profile.first + u), 0.0)
-        used = cells.table.a[j] * u[:, None] + cells.table.b[j] * y[:, None]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            speed = y[:, None] / cells.table.bounds[:, j].T
-            needed = np.where(cells.table.c[j] > 0, used / cells.table.c[j], 1.0)
-        speed = np.where(np.isnan(speed), 0.0, speed)  # 0/0: at rest under a bound of zero
-        slack = np.minimum(slack, 1 - np.sqrt(speed))
-        worst = np.maximum(speed.max(axis=1), needed.max(axis=1, initial=0.0))
-        factor = np.maximum(factor, worst)
-        for n in range(shape[1]):
-            mine = cells.table.owner == n
-            if mine.any():
-                least = (cells.table.c[j] - used)[:, mine].min(axis=1)
-                slack[:, n] = np.minimum(slack[:, n], least)
-    return Check(slack, factor)
+    table, slack = cells.table, np.empty((len(profile.d), len(cells.table.names)))
+    motion = profile.y, profile.first, profile.last
+    rows = table.a, table.b, table.c, table.bounds, table.owner
+    reach.margins(cells.d, cells.left, cells.right, *rows, *motion, slack)
+    return slack

@@ -20,6 +20,8 @@ from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.kernels import kernel
 from trajopt.timing.ranges import FLAT, end_of_feasible, u_range
 
+_NEAR = 1e-3  # of a row's scale: values that far below are no peaks that count; chosen
+
 
 @kernel(nogil=True)
 def backward(
@@ -148,6 +150,30 @@ def forward(
 
 
 @kernel(nogil=True)
+def peak(v: Array) -> float:
+    """Greatest of five evenly spread values, or of the parabola through the greatest and its
+    neighbours."""
+    k = 0
+    for i in range(1, 5):
+        if v[i] > v[k]:
+            k = i
+    m = min(max(k, 1), 3)
+    rise, bend = (v[m + 1] - v[m - 1]) / 2, v[m - 1] + v[m + 1] - 2 * v[m]
+    if bend < 0 and abs(rise) <= -1.5 * bend:
+        at = min(max(m - rise / bend, 0.0), 4.0) - m
+        return float(max(v[k], v[m] + at * (rise + at * bend / 2)))
+    return float(v[k])
+
+
+@kernel(nogil=True)
+def inside(h: float, y: float, u0: float, u1: float, u: Array, square: Array) -> None:
+    """Fills u and y (5,) at the ends and quarters of a cell."""
+    for k in range(5):
+        u[k] = u0 + k / 4 * (u1 - u0)
+        square[k] = max(y + k / 4 * h * (u0 + u[k]), 0.0)
+
+
+@kernel(nogil=True)
 def excess(
     d: Array,
     left: IndexArray,
@@ -163,23 +189,66 @@ def excess(
     factor: Array,
 ) -> None:
     """Fills over (N,), the share of a row's scale (or of the bound ``cap`` on y) by which each cell
-    breaks it at its ends and quarters, and factor (N,), what y would have to be divided by."""
+    breaks it at its ends and quarters, or where a parabola through these is highest, and factor
+    (N,), what y would have to be divided by."""
+    u, square, values = np.empty(5), np.empty(5), np.empty(5)
+    places = np.empty(5, dtype=np.intp)
     for i in range(len(d)):
         worst, most = 0.0, 1.0
+        inside(d[i], y[i], u0[i], u1[i], u, square)
         for k in range(5):
-            j = right[i] if k == 4 else left[i] + k
-            u = u0[i] + k / 4 * (u1[i] - u0[i])
-            here = max(y[i] + k / 4 * d[i] * (u0[i] + u), 0.0)
-            if here > cap[j]:
-                ratio = here / cap[j] if cap[j] > 0 else np.inf
-                worst, most = max(worst, ratio - 1), max(most, ratio)
-            for r in range(a.shape[1]):
-                used = a[j, r] * u + b[j, r] * here
-                if used > c[j, r]:
-                    worst = max(worst, used - c[j, r])
-                    if c[j, r] > 0:
-                        most = max(most, used / c[j, r])
+            places[k] = right[i] if k == 4 else left[i] + k
+            here, bound = square[k], cap[places[k]]
+            values[k] = here / bound if bound > 0 else (np.inf if here > 0 else 0.0)
+        ratio = peak(values)
+        if ratio > 1:
+            worst, most = ratio - 1, ratio
+        for r in range(a.shape[1]):
+            near, least = False, np.inf
+            for k in range(5):
+                j = places[k]
+                values[k] = a[j, r] * u[k] + b[j, r] * square[k] - c[j, r]
+                near = near or values[k] > -_NEAR
+                least = min(least, c[j, r])
+            if near:
+                high = peak(values)
+                if high > 0:
+                    worst = max(worst, high)
+                    if least > 0:
+                        most = max(most, 1 + high / least)
         over[i], factor[i] = worst, most
+
+
+@kernel(nogil=True)
+def margins(
+    d: Array,
+    left: IndexArray,
+    right: IndexArray,
+    a: Array,
+    b: Array,
+    c: Array,
+    bounds: Array,
+    owner: IndexArray,
+    y: Array,
+    u0: Array,
+    u1: Array,
+    slack: Array,
+) -> None:
+    """Fills slack (N, L): the least relative margin of every limit in each cell, with peaks as in
+    ``excess``."""
+    u, square, values = np.empty(5), np.empty(5), np.empty(5)
+    for i in range(len(d)):
+        inside(d[i], y[i], u0[i], u1[i], u, square)
+        for n in range(len(bounds)):
+            for k in range(5):
+                bound = bounds[n, right[i] if k == 4 else left[i] + k]
+                values[k] = square[k] / bound if bound > 0 else (np.inf if square[k] > 0 else 0.0)
+            slack[i, n] = 1 - np.sqrt(max(peak(values), 0.0))
+        for r in range(a.shape[1]):
+            for k in range(5):
+                j = right[i] if k == 4 else left[i] + k
+                values[k] = a[j, r] * u[k] + b[j, r] * square[k] - c[j, r]
+            slack[i, owner[r]] = min(slack[i, owner[r]], -peak(values))
 
 
 @kernel(nogil=True)

@@ -173,12 +173,12 @@ def _second_order(
     measure = Measure.of(along)
     knots = np.asarray(path.basis.knots)
     source = source_of(along, measure, job.limits)
-    edges = np.zeros(0)
+    u, edges = graded_grid(measure, gridpoints), np.zeros(0)
     if isinstance(source, Readable):  # limits may have places where they jump
-        edges = np.asarray(source.edges(along), dtype=np.float64)
+        edges = np.asarray(source.edges(along, u), dtype=np.float64)
     edges = edges[(edges > 0) & (edges < path.length)]
     wanted = np.concatenate([path.locate(np.append(job.stops, edges)), along.rests, also])
-    u, kept = placed(graded_grid(measure, gridpoints), wanted, knots)
+    u, kept = placed(u, wanted, knots)
     ask = Ask(along, job.limits, *speeds, kept[: len(job.stops)], gap)
     jumps = np.concatenate([knots, kept])
     for done in range(_TRIALS):

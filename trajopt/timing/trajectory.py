@@ -21,7 +21,7 @@ from trajopt.shown import Shown
 from trajopt.timing.energy import energies
 from trajopt.timing.profile import Profile, margins_of
 from trajopt.timing.rests import Rest, rests_of
-from trajopt.timing.stages import Check, check, fine_rows
+from trajopt.timing.stages import check, fine_rows
 from trajopt.timing.track import Track
 from trajopt.world.ground import Ground
 
@@ -29,6 +29,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _BINDS = 2e-3  # relative margin below which a limit counts as binding; above the largest slow-down (0.1 %)
+_AS_TIGHT = (
+    1e-4  # relative margin within which limits bind alike; chosen: above what tightening leaves
+)
 _ON_TIME = 1e-12  # share of the duration by which a time may lie outside through rounding
 
 
@@ -179,6 +182,12 @@ class Trajectory(Shown):
             speed = np.maximum(self.sd[i] + sdd * after, 0.0)
         return u, s, np.where(waits, 0.0, speed), np.where(waits, 0.0, sdd)
 
+    def inside(self, share: float) -> tuple[Array, Array, Array, Array]:
+        """(N,) each: spline parameter, s (m), s' and s'' in every interval, a ``share`` of the time
+        that it takes after it was entered."""
+        moving = np.diff(self.times) - self.waits[1:]
+        return self._moving(np.arange(len(moving)), share * moving, np.zeros(len(moving), bool))
+
     def _placed(self, t: ArrayLike) -> tuple[IndexArray, Array, IndexArray, Array]:
         """At times t (N,): which interval between gridpoints and the time since it was entered; the
         gridpoint at which the robot waits, -1 while it moves, and the time since it came to rest
@@ -234,7 +243,7 @@ class Trajectory(Shown):
     def margins(self) -> Mapping[str, float]:
         """Least relative margin of every limit, recomputed at the ends and quarters of the cells,
         which are small where the motion varies (or on a grid ten times finer than the solver's)."""
-        least = self._check.slack.min(axis=0)
+        least = self._slack.min(axis=0)
         return MappingProxyType(
             {limit.name: float(m) for limit, m in zip(self.limits, least, strict=True)}
         )
@@ -243,10 +252,12 @@ class Trajectory(Shown):
     def binding(self) -> tuple[str, ...]:
         """(N,): name of the limit that binds in each interval between gridpoints, "" where none
         does."""
-        slack = self._check.slack
-        least = np.argmin(slack, axis=1)
-        tight = slack[np.arange(len(slack)), least] < _BINDS
-        return tuple(self.limits[k].name if t else "" for k, t in zip(least, tight, strict=True))
+        slack = self._slack
+        tight = (slack < _BINDS) & (slack < slack.min(axis=1, keepdims=True) + _AS_TIGHT)
+        # Of several, the one that binds at the fewest places: that it does is said nowhere else.
+        rare = np.argmin(np.where(tight, tight.sum(axis=0), np.iinfo(np.int64).max), axis=1)
+        some = tight.any(axis=1)
+        return tuple(self.limits[k].name if t else "" for k, t in zip(rare, some, strict=True))
 
     @cached_property
     def active(self) -> tuple[Stretch, ...]:
@@ -262,10 +273,11 @@ class Trajectory(Shown):
         )
 
     @cached_property
-    def _check(self) -> Check:
+    def _slack(self) -> Array:
+        """(N, L): least relative margin of every limit in each interval."""
         if self.profile is not None:
             return margins_of(self.track, self.profile, self.limits)
-        return check(fine_rows(self.track, self.u, self.limits, self.sd**2), self.sd**2)
+        return check(fine_rows(self.track, self.u, self.limits, self.sd**2), self.sd**2).slack
 
     @cached_property
     def track(self) -> Track:
