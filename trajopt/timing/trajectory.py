@@ -16,12 +16,12 @@ from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
-from trajopt.robots.steering import steering_of
 from trajopt.shown import Shown
 from trajopt.timing.energy import energies
 from trajopt.timing.profile import Profile, margins_of
 from trajopt.timing.rests import Rest, rests_of
 from trajopt.timing.stages import check, fine_rows
+from trajopt.timing.states import Course, State, states_at
 from trajopt.timing.track import Track
 from trajopt.world.ground import Ground
 
@@ -41,25 +41,6 @@ class Stretch(NamedTuple):
     start: float
     end: float
     limit: str
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Robot state at N times. Poses are (x, y, yaw) in the world, twists (vx, vy, wz) in the body
-    frame, which stands on the ground."""
-
-    pose: Array  # (N, 3) m, m, rad (yaw continuous along the path)
-    twist: Array  # (N, 3) m/s, m/s, rad/s
-    wheel_angles: Array  # (N, W) rad, from the trajectory's start_wheels; W = 0 without a robot
-    wheel_speeds: Array  # (N, W) rad/s
-    position: Array  # (N, 3) of the body's origin in the world, m
-    rotation: Array  # (N, 3, 3): columns are the body's axes in the world
-    spin_angles: Array  # (N, K) rad, of all wheels of the robot's file; those of W are wheel_angles
-    spin_rates: Array  # (N, K) rad/s
-    steering_angles: (
-        Array  # (N, K) rad, of castors and steered wheels from the file's angle, else 0
-    )
-    steering_rates: Array  # (N, K) rad/s
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,12 +108,12 @@ class Trajectory(Shown):
     def waits(self) -> Array:
         """(N+1,): how long the robot rests at the gridpoints, s, while wheels turn."""
         found = np.zeros(len(self.u))
-        for node, rest in self._resting.items():
+        for node, rest in self.resting.items():
             found[node] = rest.duration
         return found
 
     @cached_property
-    def _resting(self) -> dict[int, Rest]:
+    def resting(self) -> dict[int, Rest]:
         """The rests by gridpoint."""
         return {int(np.argmin(np.abs(self.u - rest.u))): rest for rest in self.rests}
 
@@ -162,11 +143,11 @@ class Trajectory(Shown):
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,
         duration]."""
-        i, after, node, _ = self._placed(t)
-        _, s, speed, sdd = self._moving(i, after, node >= 0)
+        i, after, node, _ = self.placed(t)
+        _, s, speed, sdd = self.moving(i, after, node >= 0)
         return s, speed, sdd
 
-    def _moving(
+    def moving(
         self, i: IndexArray, after: Array, waits: BoolArray
     ) -> tuple[Array, Array, Array, Array]:
         """(N,) each: spline parameter, s, s' and s'' so long after intervals were entered."""
@@ -186,16 +167,13 @@ class Trajectory(Shown):
         """(N,) each: spline parameter, s (m), s' and s'' in every interval, a ``share`` of the time
         that it takes after it was entered."""
         moving = np.diff(self.times) - self.waits[1:]
-        return self._moving(np.arange(len(moving)), share * moving, np.zeros(len(moving), bool))
+        return self.moving(np.arange(len(moving)), share * moving, np.zeros(len(moving), bool))
 
-    def _placed(self, t: ArrayLike) -> tuple[IndexArray, Array, IndexArray, Array]:
+    def placed(self, t: ArrayLike) -> tuple[IndexArray, Array, IndexArray, Array]:
         """At times t (N,): which interval between gridpoints and the time since it was entered; the
         gridpoint at which the robot waits, -1 while it moves, and the time since it came to rest
         there."""
-        time = np.atleast_1d(as_numbers("t", t, f"times in [0, {self.duration!r}] s"))
-        slack = _ON_TIME * self.duration
-        if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
-            raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
+        time = self.within(t)
         i = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.sdd) - 1)
         moving = self.times[i + 1] - self.waits[i + 1] - self.times[i]
         after = np.clip(time - self.times[i], 0.0, moving)
@@ -204,41 +182,18 @@ class Trajectory(Shown):
         waits = (self.waits[node] > 0) & (since >= 0)
         return i, after, np.where(waits, node, -1), since
 
+    def within(self, t: ArrayLike) -> Array:
+        """(N,): times t, s. Raises ArgumentError outside [0, duration]."""
+        time = np.atleast_1d(as_numbers("t", t, f"times in [0, {self.duration!r}] s"))
+        slack = _ON_TIME * self.duration
+        if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
+            raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
+        return time
+
     def at(self, t: ArrayLike) -> State:
         """State at times t (N,) or one time (N = 1), s. Raises ArgumentError outside [0,
         duration]."""
-        i, after, node, since = self._placed(t)
-        found, s, speed, _ = self._moving(i, after, node >= 0)
-        inside = np.where(i + 2 < len(self.u), np.nextafter(self.u[i + 1], -np.inf), self.u[-1])
-        u = np.clip(found, self.u[i], inside)
-        u = np.where(node >= 0, self.u[node], u)
-        samples = self.track.samples(s, u)
-        table_u, table_yaw = self._yaw_table
-        turns = np.round((np.interp(u, table_u, table_yaw) - samples.yaw) / (2 * np.pi))
-        pose = np.column_stack([samples.position[:, :2], samples.yaw + 2 * np.pi * turns])
-        twist = samples.twist * speed[:, None]
-        place = (samples.position, samples.rotation)
-        if self.robot is None or samples.wheels is None:
-            none = np.zeros((len(s), 0))
-            return State(pose, twist, none, none, *place, none, none, none, none)
-        rolling, wheels = steering_of(self.robot).rolling, samples.wheels
-        angles, rates = self.track.wheels.at(u), wheels.spin * speed[:, None]
-        angles[:, rolling] += self.start_wheels
-        turned, turning = wheels.steering.copy(), wheels.steering_rate * speed[:, None]
-        for gridpoint, rest in self._resting.items():
-            ahead, turning[node == gridpoint] = rest.ahead(since[node == gridpoint])
-            turned[node == gridpoint] -= ahead
-        return State(
-            pose,
-            twist,
-            angles[:, rolling],
-            rates[:, rolling],
-            *place,
-            angles,
-            rates,
-            turned,
-            turning,
-        )
+        return states_at(self, t)
 
     def margins(self) -> Mapping[str, float]:
         """Least relative margin of every limit, recomputed at the ends and quarters of the cells,
@@ -286,7 +241,6 @@ class Trajectory(Shown):
         return Track(self.path, self.robot, self.ground, self.start_steering, rests)
 
     @cached_property
-    def _yaw_table(self) -> tuple[Array, Array]:
-        """Continuous yaw at spline parameters close enough to tell the turn."""
-        u = np.linspace(self.path.start, self.path.end, 256 * (len(self.path.basis.knots) - 1) + 1)
-        return u, self.path.yaw(u)
+    def course(self) -> Course:
+        """What ``at`` needs once."""
+        return Course(self)
