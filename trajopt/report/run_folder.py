@@ -38,6 +38,7 @@ from trajopt.report.files import (
 from trajopt.report.motion import (
     binding_shares,
     column,
+    sampled,
     timing_table,
     trajectory_table,
     turning_wheels,
@@ -178,6 +179,7 @@ def solution_summary(solution: Solution, *, seed: int) -> dict[str, Any]:
             "slowdown": trajectory.slowdown,
             "least_time_s": trajectory.bound,
             "gap": trajectory.gap,
+            "sampled": sampled(trajectory),
             "limits": [limit.name for limit in trajectory.limits],
         },
         "search": _search_summary(solution, seed),

@@ -80,8 +80,8 @@ class Trajectory(Shown):
         return f"Trajectory({robot}, {self.duration:.4g} s over {self.path.length:.4g} m)"
 
     def to_frame(self) -> pd.DataFrame:
-        """The motion in steps of at most 10 ms, the columns of ``trajectory.csv``; units in the
-        names."""
+        """The motion in steps of at most 10 ms (in all at most some 20,000, then by cells of the
+        profile), the columns of ``trajectory.csv``; units in the names."""
         import pandas
 
         from trajopt.report.motion import trajectory_table
