@@ -66,7 +66,9 @@ def test_slow_motions_have_rows_by_the_cells_of_the_profile() -> None:
     timed = time_scale(path, [Speed(1.0), Acceleration(1e-6, 1e-6)], robot=robot("loc8"))
     assert timed.duration > 3000
     times = table_times(timed)
-    assert times[0] == 0 and times[-1] == timed.duration and np.all(np.diff(times) > 0)
+    assert times[0] == 0
+    assert times[-1] == timed.duration
+    assert np.all(np.diff(times) > 0)
     assert 10_000 < len(times) <= MOST_ROWS + 1
     assert np.isin(timed.times, times).all()
     table = pd.DataFrame(trajectory_table(timed))

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from scaling_cases import HOLONOMIC_ONLY, PATHS, ROBOTS, limit
+from scaling_cases import HOLONOMIC_ONLY, PATHS, limit
 
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.speed import Speed
@@ -39,7 +39,9 @@ def test_compiled_states_are_the_readable_ones(shape, name):
     if name == "powerbot" and shape in HOLONOMIC_ONLY:
         pytest.skip("its wheels forbid the path")
     limits = [limit("speed"), limit("acceleration")]
-    trajectory = time_scale(PATHS[shape], limits, robot=robot(name), start_wheels=(0.3,) * _rolling(name))
+    trajectory = time_scale(
+        PATHS[shape], limits, robot=robot(name), start_wheels=(0.3,) * _rolling(name)
+    )
     t = np.linspace(0.0, trajectory.duration, 501)
     agree(trajectory, t)
     agree(trajectory, np.random.default_rng(3).permutation(t))

@@ -65,9 +65,7 @@ def _found(sorted_values: Array, value: float, last: int) -> int:
 
 
 @kernel(nogil=True)
-def _moment(
-    h: float, y: float, first: float, last: float, after: float
-) -> tuple[float, float]:
+def _moment(h: float, y: float, first: float, last: float, after: float) -> tuple[float, float]:
     """As ``reach.moments``: sigma gained and sigma'."""
     slope = (last - first) / h
     z, w = slope * after * after, np.sqrt(max(y, 0.0))
@@ -208,9 +206,7 @@ def wheels(
                 continue
             spin[k, q] = start[q] + value
             spin_rate[k, q] = unit[k, 3] * (
-                inverse[q, 0] * unit[k, 0]
-                + inverse[q, 1] * unit[k, 1]
-                + inverse[q, 2] * unit[k, 2]
+                inverse[q, 0] * unit[k, 0] + inverse[q, 1] * unit[k, 1] + inverse[q, 2] * unit[k, 2]
             )
     return s
 

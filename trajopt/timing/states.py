@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, BoolArray
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.robots.steering import steering_of
@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from trajopt.timing.profile import Profile
     from trajopt.timing.trajectory import Trajectory
 
-_PARTS = 256  # of a segment, between which no path that follows a surface turns by half a turn; chosen
+_PARTS = (
+    256  # of a segment, between which no path that follows a surface turns by half a turn; chosen
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,7 @@ class Course:
         return np.ascontiguousarray(self.trajectory.times)
 
     @cached_property
-    def sigma(self) -> tuple[Array, Array]:
+    def sigma(self) -> tuple[Array, BoolArray]:
         """As ``motion_kernel.sigma_powers``."""
         from trajopt.timing import motion_kernel as kernels
 
@@ -164,7 +166,19 @@ def _level_states(trajectory: Trajectory, t: ArrayLike) -> State:
         length = trajectory.profile.measure.length
     turns, yaws = (np.zeros(2), np.zeros(2)) if free else course.yaws
     kernels.bodies(
-        *course.cubics, free, length, turns, yaws, u, speed, bent, pose, twist, position, rotation, unit
+        *course.cubics,
+        free,
+        length,
+        turns,
+        yaws,
+        u,
+        speed,
+        bent,
+        pose,
+        twist,
+        position,
+        rotation,
+        unit,
     )
     robot = trajectory.robot
     if robot is None:

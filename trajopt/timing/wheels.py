@@ -36,7 +36,9 @@ class WheelTable:
         i = np.clip(np.searchsorted(self.u, u, side="right") - 1, 0, len(self.u) - 2)
         t = ((u - self.u[i]) / (self.u[i + 1] - self.u[i]))[:, None]
         c = self.powers[i, :-1]
-        gained = t * (c[..., 0] + t * (c[..., 1] + t * (c[..., 2] + t * (c[..., 3] + t * c[..., 4]))))
+        gained = t * (
+            c[..., 0] + t * (c[..., 1] + t * (c[..., 2] + t * (c[..., 3] + t * c[..., 4])))
+        )
         return np.asarray(self.sums[i, :-1] + gained)
 
 

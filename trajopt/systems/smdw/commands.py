@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
-from rich import box
-from rich.table import Table
 
 from trajopt.cli.shared import (
     FAULTY,
@@ -22,6 +20,7 @@ from trajopt.cli.shared import (
     console,
     control_mode,
     overrides,
+    simple_table,
 )
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
@@ -51,7 +50,7 @@ def plan(
     console.print(
         words((found.problem.title, "bold"), f": {found.status} ({found.wall_time:.2f} s)")
     )
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = simple_table()
     for column in (
         "configuration",
         "duration (s)",
