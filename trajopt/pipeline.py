@@ -5,11 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult
@@ -17,15 +16,15 @@ from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
 from trajopt.problem import Problem
 from trajopt.problem.extensions import SECTIONS, entry
-from trajopt.refine.profile import follow
-from trajopt.simulate.check import ValidationReport
-from trajopt.simulate.check import validate as check
-from trajopt.simulate.engine import Engine
 from trajopt.solution import Solution, search_objective
-from trajopt.timing.nominal import nominal_timing
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.scene import Scene
+
+if TYPE_CHECKING:
+    from trajopt.control.approach import Mode
+    from trajopt.simulate.check import ValidationReport
+    from trajopt.simulate.engine import Engine
 
 # Where no wheel angle counts, every candidate is timed: 5 to 30 ms each. Chosen: within 0.1 % of
 # longer searches on a scenario's space.
@@ -112,12 +111,16 @@ def _timed(
         if problem.actuator is not None and searched is not None:
             if engine != "auto":
                 raise ArgumentError("engine", engine, "auto with [actuator]: nothing is scaled")
+            from trajopt.timing.nominal import nominal_timing
+
             terminal = terminal_objective(problem)
             duration = float(terminal.control_points(searched.x[:, None]).duration[0, 0])
             timed = nominal_timing(path, duration, limits, **around)
         elif problem.profile is not None:
             if engine != "auto":
                 raise ArgumentError("engine", engine, "auto with [profile]")
+            from trajopt.refine.profile import follow
+
             bound, manner = problem.profile.bound, problem.profile.manner
             timed = follow(path, bound, limits, manner=manner, **around).trajectory
         else:
@@ -148,6 +151,8 @@ def validate(
     ArgumentError for what cannot be driven there, MissingDependencyError where the engine is not
     installed and SimulationError where the simulation leaves physics.
     """
+    from trajopt.simulate.check import validate as check
+
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError(
             "trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory has one)"

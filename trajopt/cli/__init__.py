@@ -11,10 +11,10 @@ import typer
 from trajopt.cli import bench, paths, robot, search, sweep, view
 from trajopt.cli.shared import leaving
 from trajopt.errors import TrajoptError
-from trajopt.report.words import PlainConsole
 
 app = typer.Typer(
     add_completion=False,
+    rich_markup_mode=None,  # rich takes twice as long to load as all the rest
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="Plan, time and check motions of wheeled ground robots.",
@@ -47,6 +47,8 @@ def main() -> None:
             app()
     # OSError: a folder that cannot be made, a full disk: the message names the file
     except (TrajoptError, OSError) as error:
+        from trajopt.report.console import PlainConsole
+
         PlainConsole(stderr=True, soft_wrap=True).print(f"error: {error}")
         sys.exit(UNUSABLE)
     except KeyboardInterrupt:

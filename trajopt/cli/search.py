@@ -21,7 +21,6 @@ from trajopt.cli.shared import (
     picture_kind,
 )
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
 from trajopt.report.words import words
 
 if TYPE_CHECKING:
@@ -145,6 +144,8 @@ def schema(
     if out is None:
         sys.stdout.write(text)
     else:
+        from trajopt.files import whole_file
+
         with whole_file(out) as part:
             part.write_text(text, encoding="utf-8")
 

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
-from rich.table import Table
 
 from trajopt.cli.shared import FormatOption, console, leaving, picture_kind
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
-from trajopt.report.words import PlainConsole, words
+from trajopt.report.words import words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -165,6 +163,8 @@ def status(store: StorePath) -> None:
 
     place = open_store(store, create=False)
     counts, runs = place.counts(), place.runs()
+    from rich.table import Table
+
     shown = Table("status", "cases", title=str(store), title_justify="left")
     for name, count in counts.items():
         shown.add_row(name, str(count))
@@ -197,6 +197,8 @@ def show(
     from trajopt.sweeps.store import open_store
 
     row, arrays = open_store(store, create=False).case(case)
+    from rich.table import Table
+
     shown = Table("name", "value", title=f"case {row['case']}", title_justify="left")
     for name, value in row.items():
         if value is not None and name not in ("case", "error_traceback"):
@@ -285,6 +287,8 @@ def export(
     place = open_store(store, create=False)
     if out.suffix not in (".csv", ".parquet", ".jsonl"):
         raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
+    from trajopt.files import whole_file
+
     with whole_file(out) as part:
         match out.suffix:
             case ".csv":
@@ -379,6 +383,8 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
 
     console.print(f"{plan.title}: {len(plan.table)} cases")
     first = plan.table.take(np.arange(min(_SHOWN, len(plan.table)))).rows()
+    from rich.table import Table
+
     shown = Table("case", *plan.table.columns)
     for case in first:
         shown.add_row(
@@ -417,6 +423,8 @@ def _print_errors(store: Store) -> None:
     failed = frame[frame["status"] != "done"]
     if failed.empty:
         return
+    from rich.table import Table
+
     shown = Table(
         "cases", "error", "first message", "first case", title="not done", title_justify="left"
     )
@@ -440,6 +448,8 @@ def _engine(name: str, workers: int, host: str, tls: Path | None) -> Engine:
         )
     if host not in ("127.0.0.1", "::1", "localhost") and tls is None:
         told = f"--host {host}: whoever reaches it can run code as you, as Dask asks no password; see --tls"
+        from trajopt.report.console import PlainConsole
+
         PlainConsole(stderr=True).print(f"warning: {told}")
 
     count = workers or engines.available_processors()
@@ -458,6 +468,8 @@ def _engine(name: str, workers: int, host: str, tls: Path | None) -> Engine:
 def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
     """Progress with rate and remaining time on a terminal; a line a minute where there is none."""
     from rich import progress as bars
+
+    from trajopt.report.console import PlainConsole
 
     bar = bars.Progress(
         bars.TextColumn("{task.fields[failed]}"),

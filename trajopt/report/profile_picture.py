@@ -31,7 +31,8 @@ from trajopt.report.style import (
 )
 from trajopt.robots.steering import steering_of
 from trajopt.solution import MARGIN, Solution
-from trajopt.timing.trajectory import State, Trajectory
+from trajopt.timing.states import State
+from trajopt.timing.trajectory import Trajectory
 
 _SAMPLES = 1200  # times at which curves are drawn, chosen: more than pixels across
 _BAND = 0.16  # opacity of the bands that mark the limit which binds, chosen

@@ -39,6 +39,7 @@ from trajopt.report.files import (
 from trajopt.report.motion import (
     binding_shares,
     column,
+    sampled,
     timing_table,
     trajectory_table,
     turning_wheels,
@@ -46,6 +47,9 @@ from trajopt.report.motion import (
 )
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
+from trajopt.timing.cells import Measure
+from trajopt.timing.profile import Profile
+from trajopt.timing.track import Track
 from trajopt.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -71,8 +75,12 @@ _OF_A_SOLUTION = (
     "explored.npz",
     *_PICTURES,
 )
+_SIGMA = ("sigma_dot_squared_m2_s2", "sigma_ddot_first_m_s2", "sigma_ddot_last_m_s2")
 _TABLES = {  # columns that are read back, and those of them that may hold gaps
-    "timing.csv": (("u", "s_m", "s_dot_m_s", "s_ddot_m_s2"), ("s_ddot_m_s2",)),
+    "timing.csv": (
+        ("u", "s_m", "s_dot_m_s", "s_ddot_m_s2", *_SIGMA),
+        ("s_ddot_m_s2", *_SIGMA),
+    ),
     "history.csv": (("evaluations", "cost", "violation", "seconds_s"), ("cost", "violation")),
 }
 
@@ -176,6 +184,9 @@ def solution_summary(solution: Solution, *, seed: int) -> dict[str, Any]:
             "engine": trajectory.engine,
             "gridpoints": len(trajectory.s),
             "slowdown": trajectory.slowdown,
+            "least_time_s": trajectory.bound,
+            "gap": trajectory.gap,
+            "sampled": sampled(trajectory),
             "limits": [limit.name for limit in trajectory.limits],
         },
         "search": _search_summary(solution, seed),
@@ -354,6 +365,11 @@ def _trajectory(
     known = {limit.name: limit for limit in problem.limits}
     if problem.profile is not None:
         known[problem.profile.bound.name] = problem.profile.bound
+    profile, square = None, table["sigma_dot_squared_m2_s2"]
+    if np.isfinite(square).all():
+        measure = Measure.of(Track(path, problem.robot, problem.scene.ground))
+        pulls = (table[name][:-1] for name in _SIGMA[1:])
+        profile = Profile(measure, table["u"], measure.sigma(table["u"]), square, *pulls)
     return Trajectory(
         path,
         tuple(known[name] for name in timing["limits"]),
@@ -367,6 +383,8 @@ def _trajectory(
         timing["slowdown"],
         problem.start_wheels,
         problem.start_steering,
+        profile,
+        timing["least_time_s"],
     )
 
 

@@ -10,8 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
-from rich import box
-from rich.table import Table
 
 from trajopt.cli.shared import (
     FAULTY,
@@ -24,6 +22,7 @@ from trajopt.cli.shared import (
     control_mode,
     overrides,
     picture_kind,
+    simple_table,
 )
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
@@ -55,7 +54,7 @@ def plan(
     console.print(
         words((found.problem.title, "bold"), f": {found.status} ({found.wall_time:.2f} s)")
     )
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = simple_table()
     for column in (
         "configuration",
         "duration (s)",
