@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from trajopt.errors import ArgumentError
-from trajopt.report.files import FORMATS
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -70,6 +69,8 @@ Overrides = Annotated[
 def picture_kind(pictures: bool, kind: str | None) -> str | None:
     """The format of pictures, None where there shall be none. Raises ArgumentError for another format, or one beside
     --no-pictures."""
+    from trajopt.report.files import FORMATS
+
     if kind is not None and (kind not in FORMATS or not pictures):
         raise ArgumentError("--format", kind, f"one of {', '.join(FORMATS)}, without --no-pictures")
     return (kind or "png") if pictures else None
