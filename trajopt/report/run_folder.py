@@ -39,8 +39,8 @@ from trajopt.report.files import (
 from trajopt.report.motion import (
     binding_shares,
     column,
-    sampled,
     given_columns,
+    sampled,
     timing_table,
     trajectory_table,
     turning_wheels,
