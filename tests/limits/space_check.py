@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
+from scipy.optimize import linprog
 
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.contact import Contact
@@ -30,6 +31,7 @@ from trajopt.timing.track import Track
 from trajopt.timing.trajectory import Trajectory
 
 G = 9.80665
+CORNERS = 72  # a polygon that many sided around a circle is up to 0.1 % larger
 FIRST = np.array([1, -8, 0, 8, -1]) / 12
 SECOND = np.array([-1, 16, -30, 16, -1]) / 12
 
@@ -132,13 +134,39 @@ def contact_slips(robot: Robot, now: Instant) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Statics:
-    """Force and moment that the ground gives the body, per mass in its axes, and loads (K,)."""
+    """Force and moment that the ground gives the body, per mass in its axes; arms (K, 3) and loads
+    (K,) of wheels, and of what holds the body up: wheels, and axles that tilt."""
 
     force: np.ndarray
     moment: np.ndarray
     arms: np.ndarray
     loads: np.ndarray
     cog: np.ndarray
+    axles: list[Axle]
+
+
+@dataclass(frozen=True)
+class Axle:
+    """``wheels`` on an axle that turns freely about the line through ``middle`` (3,), from the
+    centre of gravity, along ``ahead`` (3,)."""
+
+    wheels: list[int]
+    middle: np.ndarray
+    ahead: np.ndarray
+
+
+def axles_that_tilt(robot: Robot, now: Instant) -> list[Axle]:
+    found, wheels = [], robot.description.wheels
+    for pivot in robot.description.pivots:
+        if pivot.tilt == "passive":
+            mine = [k for k, wheel in enumerate(wheels) if wheel.name in pivot.wheels]
+            first = wheels[mine[0]]
+            angle = first.angle + now.steering[2, mine[0]]
+            ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
+            joint = np.array([*first.position, first.radius])
+            middle = joint - first.trail * ahead - np.array(robot.body.cog)
+            found.append(Axle(mine, middle, ahead))
+    return found
 
 
 def statics(robot: Robot, now: Instant) -> Statics:
@@ -158,12 +186,26 @@ def statics(robot: Robot, now: Instant) -> Statics:
     # the tangential forces all act at the contacts' height: only their sum tips the body
     tilt = moment - np.cross([0.0, 0.0, -body.cog[2]], [force[0], force[1], 0.0])
     balance = np.vstack([np.ones(len(arms)), arms[:, 1], -arms[:, 0]])
-    loads = np.linalg.lstsq(balance, np.array([force[2], tilt[0], tilt[1]]))[0]
-    return Statics(force, moment, arms, loads, np.array(body.cog))
+    wanted = [force[2], tilt[0], tilt[1]]
+    axles, cog = axles_that_tilt(robot, now), np.array(body.cog)
+    level = shares(robot, now, Statics(force, moment, arms, np.zeros(len(arms)), cog, axles))
+    for axle in axles:  # the moment of loads and forces of its wheels about its axis
+        turning = np.zeros(len(arms))
+        along = 0.0
+        for k in axle.wheels:
+            arm = arms[k] - axle.middle
+            turning[k] = np.cross(arm, [0.0, 0.0, 1.0]) @ axle.ahead
+            along += float(np.cross(arm, [*level.get(k, (0.0, 0.0)), 0.0]) @ axle.ahead)
+        balance, wanted = np.vstack([balance, turning]), [*wanted, -along]
+    loads = np.linalg.lstsq(balance, np.array(wanted))[0]
+    return Statics(force, moment, arms, loads, cog, axles)
 
 
-def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
-    """Least-norm force of every wheel that can hold, in the body's x and y, per mass."""
+def possible(
+    robot: Robot, now: Instant, found: Statics
+) -> tuple[np.ndarray, list[int], np.ndarray, np.ndarray]:
+    """Directions (F, 2) of all forces of wheels that can hold, the wheel of each, and the equations
+    (E, F), (E,) that forces per mass obey: sums, yaw moment, pivots that turn freely."""
     driven = {name for motor in robot.description.motors for name in motor.wheels}
     pivots = [set(p.wheels) for p in robot.description.pivots]
     together = set().union(*pivots) if pivots else set()
@@ -195,7 +237,13 @@ def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
             lever.append(arm[0] * e[1] - arm[1] * e[0] if wheel.name in pivot else 0.0)
         rows.append(np.array(lever))
         wanted.append(0.0)
-    forces = np.linalg.lstsq(np.array(rows), np.array(wanted))[0]
+    return d, owner, np.array(rows), np.array(wanted)
+
+
+def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
+    """Least-norm force of every wheel that can hold, in the body's x and y, per mass."""
+    d, owner, rows, wanted = possible(robot, now, found)
+    forces = np.linalg.lstsq(rows, wanted)[0]
     return {
         k: sum(f * e for f, e, o in zip(forces, d, owner, strict=True) if o == k)
         for k in dict.fromkeys(owner)
@@ -238,7 +286,8 @@ def used(robot: Robot, limits: Sequence, now: Instant) -> dict[str, float]:
             case Contact():
                 found[limit.name] = 1 - there.loads.min() / (G / len(there.loads))
             case Slip():
-                found[limit.name] = slip_used(robot, now, there, limit)
+                check = capacity_used if limit.rule == "capacity" else slip_used
+                found[limit.name] = check(robot, now, there, limit)
             case _:
                 raise NotImplementedError(limit)
     return found
@@ -257,10 +306,13 @@ def _group(robot: Robot, now: Instant, derivative) -> np.ndarray:
 
 
 def tip_margin(found: Statics) -> float:
-    """Load on the far side of the edge that tips first: over every pair of contacts with all
-    others on one side."""
-    least, points = np.inf, found.arms[:, :2]
-    centre = np.array([found.loads @ points[:, 0], found.loads @ points[:, 1]])
+    """Load on the far side of the edge that tips first: over every pair of contacts, or middles of
+    axles that tilt, with all others on one side."""
+    together = {k for axle in found.axles for k in axle.wheels}
+    alone = [k for k in range(len(found.loads)) if k not in together]
+    points = np.array([found.arms[k, :2] for k in alone] + [a.middle[:2] for a in found.axles])
+    loads = [*found.loads[alone], *(found.loads[a.wheels].sum() for a in found.axles)]
+    least, centre = np.inf, np.array(loads) @ points
     for i in range(len(points)):
         for j in range(len(points)):
             edge = points[j] - points[i]
@@ -288,10 +340,35 @@ def forces_and_holds(
     wheels, mu = robot.description.wheels, friction_under(now, there, limit.friction)
     forces = shares(robot, now, there)
     alone = all(wheels[k].kind in ("fixed", "steered") and wheels[k].name in driven for k in forces)
-    if alone and not limit.per_wheel:
+    if limit.rule == "load":
+        assert alone
         hold = sum(mu[k] * there.loads[k] for k in forces)
         return [(float(np.hypot(*there.force[:2])), hold)]
     return [(float(np.hypot(*f)), mu[k] * there.loads[k]) for k, f in forces.items()]
+
+
+def capacity_used(robot: Robot, now: Instant, there: Statics, limit: Slip) -> float:
+    """The least share of every wheel's friction with which any forces hold the robot: a linear
+    programme, whose cones have CORNERS sides outside them."""
+    d, owner, rows, wanted = possible(robot, now, there)
+    mu, count = friction_under(now, there, limit.friction), len(owner)
+    angles = 2 * np.pi * np.arange(CORNERS) / CORNERS
+    bounds = []
+    for k in dict.fromkeys(owner):
+        mine = np.array([o == k for o in owner])
+        for normal in np.column_stack([np.cos(angles), np.sin(angles)]):
+            hold = max(mu[k] * there.loads[k], 1e-9)
+            bounds.append([*np.where(mine, d @ normal, 0.0), -hold])
+    done = linprog(
+        [*np.zeros(count), 1.0],
+        A_ub=np.array(bounds),
+        b_ub=np.zeros(len(bounds)),
+        A_eq=np.column_stack([rows, np.zeros(len(rows))]),
+        b_eq=wanted,
+        bounds=[(None, None)] * count + [(0, None)],
+    )
+    assert done.status == 0, done.message
+    return float(done.x[-1])
 
 
 def friction_under(now: Instant, there: Statics, friction: Friction) -> np.ndarray:
