@@ -49,7 +49,7 @@ def capacity_rows(
     else:
         net, inside = _net(sides)
         lower = np.asarray(np.linalg.cholesky(forces @ forces.swapaxes(-1, -2)), np.float64)
-        even = np.linalg.inv(lower)
+        even = np.asarray(np.linalg.inv(lower), np.float64)
         ways = np.concatenate([net @ even, _edges(holds, forces, lower, even, sides)], axis=-2)
     moving = ways @ forces
     if holds.free:
