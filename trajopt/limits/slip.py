@@ -62,7 +62,7 @@ class Slip:
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         robot = require_robot(self.name, robot)
-        whole = self._rule(robot) == "capacity"
+        whole = self.rule_of(robot) == "capacity"
         found, scale = (self._together if whole else self._each)(path, robot)
         rows = linear_rows(self.name, found.a, found.b, -found.c, scale)
         return replace(rows, edges=edges(self.friction, path, robot))
@@ -79,7 +79,7 @@ class Slip:
         shares, sizes = [], []
         for force, grip, size in self._shares(path, robot):
             pair = force.a.shape[1] == 2
-            normals = _normals(self.sides) if pair else np.array([[1.0], [-1.0]])
+            normals = normals_of(self.sides) if pair else np.array([[1.0], [-1.0]])
             inside = np.cos(np.pi / self.sides) if pair else 1.0
             shares.append(force.through(normals) - grip * inside)
             sizes.append(np.broadcast_to(size * STANDARD_GRAVITY, shares[-1].a.shape))
@@ -88,7 +88,7 @@ class Slip:
     def needed(self, path: PathSamples, robot: Robot, sdd: Array, sd2: Array) -> Array:
         """(N,): how many times the friction there is a state s'' and s'^2 (N,) needs, with the cone
         itself; inf where a wheel that must hold carries no load."""
-        if self._rule(robot) == "capacity":
+        if self.rule_of(robot) == "capacity":
             return friction_used(path, robot, self._grips(path, robot)[0].at(sdd, sd2), sdd, sd2)
         worst = np.zeros(len(path.s))
         for force, grip, _ in self._shares(path, robot):
@@ -99,7 +99,8 @@ class Slip:
             worst = np.maximum(worst, share)
         return worst
 
-    def _rule(self, robot: Robot) -> Sharing:
+    def rule_of(self, robot: Robot) -> Sharing:
+        """The rule, or the robot's."""
         return robot.description.sharing if self.rule is None else self.rule
 
     def _grips(self, path: PathSamples, robot: Robot) -> tuple[Affine, Array]:
@@ -112,7 +113,7 @@ class Slip:
         the weight, for every wheel or for all together."""
         holds = holds_of(robot)
         grips, mu = self._grips(path, robot)
-        if self._rule(robot) == "load":
+        if self.rule_of(robot) == "load":
             if not holds.all_drive:
                 expected = f"least_norm or capacity: '{robot.name}' has wheels that hold in one direction or swivel"
                 raise ArgumentError(f"{self.name}.rule", "load", expected)
@@ -129,7 +130,7 @@ class Slip:
         return found
 
 
-def _normals(sides: int) -> Array:
+def normals_of(sides: int) -> Array:
     """(sides, 2): outward normals of a polygon with a corner straight ahead."""
     angles = 2 * np.pi * (np.arange(sides) + 0.5) / sides
     return np.column_stack([np.cos(angles), np.sin(angles)])

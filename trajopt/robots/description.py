@@ -208,8 +208,12 @@ class SteeringSection(Section):
         description="of several wheels: ackermann, each at the angle that its own place needs; "
         "parallel, all at the angle that the place in their middle needs",
     )
-    rate: Positive | None = Field(None, description="largest, rad/s; absent: no limit")
-    acceleration: Positive | None = Field(None, description="largest, rad/s^2; absent: no limit")
+    rate: Positive | None = Field(
+        None, description="largest, of each of its wheels, rad/s; absent: no limit"
+    )
+    acceleration: Positive | None = Field(
+        None, description="largest, of each of its wheels, rad/s^2; absent: no limit"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
