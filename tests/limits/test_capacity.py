@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from limits.slopes import along_of, rest_on
-from limits.space_check import capacity_used, instant_of, statics
+from limits.space_check import instant_of
+from limits.space_statics import capacity_used, statics
 from limits.test_rows_in_space import driven
 
 from trajopt.errors import ArgumentError

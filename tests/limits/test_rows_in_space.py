@@ -7,7 +7,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from limits.space_check import contact_slips, forces_and_holds, instant_of, statics, used
+from limits.space_check import contact_slips, instant_of, used
+from limits.space_statics import forces_and_holds, statics
 from world.shapes import HILLS, TILTED, mesh_of
 
 from trajopt.limits.acceleration import Acceleration
