@@ -207,7 +207,7 @@ def test_a_tall_powerbot_tips_where_the_model_says(word: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("word", TIPS)
-@pytest.mark.parametrize("name", [name for name in ROBOTS if name != "asoc-4"])
+@pytest.mark.parametrize("name", ROBOTS)
 def test_tall_robots_tip_where_the_model_says(name: str, word: str, engine: str) -> None:
     machine, direction = robot(name, TALL[name]), TIPS[word]
     expected, within = tip_slope(machine, direction), math.radians(1.5)

@@ -115,7 +115,7 @@ def slip_rows(
     cog: Array,
     grips: Array,
     gravity: float,
-    normals: Array,
+    pushes: Array,
     inside: float,
     scale: float,
     first: int,
@@ -123,8 +123,9 @@ def slip_rows(
     b: Array,
     c: Array,
 ) -> None:
-    """As ``Slip`` where wheels share the force as their loads allow; ``grips`` (K,): friction of
-    the wheels that hold, else 0."""
+    """As ``Slip`` where all that hold along and across are rigid: ``pushes`` (R, 3) times force and
+    yaw moment over angular acceleration <= ``grips`` (K,) times load, friction of the wheels that
+    hold it, else 0."""
     for k in range(len(at)):
         # Loads of least norm are B' (B B')^-1 (fz, -h fx, -h fy) with columns (1, x, y) of B.
         xx = xy = yy = sx = sy = 0.0
@@ -143,10 +144,11 @@ def slip_rows(
         w0 = g0 / count - mx * w1 - my * w2
         ax, ay, bx, by = _force(at[k], cog)
         load = inside / scale * cog[2]
-        for r in range(len(normals)):
-            nx, ny = normals[r, 0] / scale + load * w1, normals[r, 1] / scale + load * w2
-            a[k, first + r] = nx * ax + ny * ay
-            b[k, first + r] = nx * bx + ny * by
+        for r in range(len(pushes)):
+            nx, ny = pushes[r, 0] / scale + load * w1, pushes[r, 1] / scale + load * w2
+            turn = pushes[r, 2] / scale
+            a[k, first + r] = nx * ax + ny * ay + turn * at[k, 2]
+            b[k, first + r] = nx * bx + ny * by + turn * at[k, 6]
             c[k, first + r] = inside * w0 * gravity / scale
 
 
