@@ -151,8 +151,6 @@ def test_bench_files_name_the_wrong_key(tmp_path: Path, text: str, wanted: str) 
 def test_the_shipped_bench_file_names_existing_problems_and_optimizers() -> None:
     pytest.importorskip("pymoo")
     pytest.importorskip("optimagic")
-    pytest.importorskip("cma")
-    pytest.importorskip("nlopt")
     plan = load_bench(Path(__file__).parents[2] / "benchmarks" / "pso_vs_gradient.toml")
     assert len(plan.optimizers) >= 8
     assert plan.seeds >= 15

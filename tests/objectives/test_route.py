@@ -100,7 +100,7 @@ def test_every_corridor_can_be_driven(seed: int) -> None:
 
 def test_symbols_give_the_numbers() -> None:
     ca = pytest.importorskip("casadi")
-    from trajopt.optimize.ipopt import numpy_on_symbols
+    from trajopt.optimize.symbols import numpy_on_symbols
 
     objective = random_corridor(4, "length")
     z = ca.MX.sym("z", objective.dimension)

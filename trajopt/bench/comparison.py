@@ -84,16 +84,7 @@ def suits(method: Optimizer, objective: Any) -> bool:
         return False
     if method.name == "lattice" and not hasattr(objective, "affine_part"):
         return False
-    only_bounds = (
-        "l-bfgs-b",
-        "nelder-mead",
-        "dual-annealing",
-        "direct",
-        "bobyqa",
-        "pyswarms",
-        "pymoo-pso",
-    )
-    return not (objective.constrained and method.name in only_bounds)
+    return not (objective.constrained and getattr(method, "only_bounds", False))
 
 
 def named_optimizer(name: str, plugins: Iterable[str] = ()) -> Optimizer:

@@ -37,7 +37,7 @@ _SHOWN = (
     "pyswarms",
     "cma-es",
     "differential-evolution",
-    "hybrid",
+    "auto",
     "lattice",
     "ipopt",
     "slsqp",

@@ -28,14 +28,9 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
-from trajopt.optimize.base import (
-    Run,
-    Status,
-    checked_bounds,
-    checked_x0,
-)
-from trajopt.optimize.method import Method
-from trajopt.optimize.swarm import Swarm, SwarmRules
+from trajopt.optimize.base import Status, checked_bounds, checked_x0
+from trajopt.optimize.run import Run
+from trajopt.optimize.swarm import Swarm, SwarmRules, warm
 
 Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
@@ -47,9 +42,8 @@ _CHOICES = {
 
 
 @dataclass(frozen=True)
-class ParticleSwarm(Method):
-    """PSO; a start (d,) becomes the first particle's position. Defaults are the constriction PSO
-    with a global best; the functions below are presets.
+class ParticleSwarm:
+    """PSO. Defaults are the constriction PSO with a global best; the functions below are presets.
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position
     inside 0.9 of the space ([guzman2015], Table 5.4) and stops the particle; "reflect" mirrors it
@@ -68,6 +62,7 @@ class ParticleSwarm(Method):
     name: ClassVar[str] = "pso"
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
+    saves: ClassVar[bool] = True
 
     particles: int = 50  # [guzman2015], section 4.2.2
     inertia: float = 0.7298  # [clerc2002]: constriction factor for phi = 4.1
@@ -104,12 +99,18 @@ class ParticleSwarm(Method):
         if self.stagnation is not None and self.stagnation < 1:
             raise ArgumentError("stagnation", self.stagnation, "at least 1 iteration, or None")
 
-    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
-        box = run.bounds
-        ended = self._flight(run, self.swarm(box, rng, x0=x0))
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        """Search until the budget ends or, without ``restart``, the swarm stagnates or collapses to
+        one point.
+
+        ``x0`` (d,) becomes the first particle's position.
+        """
+        warm()
+        run.constructed()
+        ended = self._search(run, self.swarm(run.bounds, rng, x0=x0))
         while self.restart:
-            best = None if run.best_x is None else np.clip(run.best_x, box[:, 0], box[:, 1])
-            self._flight(run, self.swarm(box, rng, x0=best))
+            best = None if run.best_x is None else np.clip(run.best_x, *run.bounds.T)
+            self._search(run, self.swarm(run.bounds, rng, x0=best))
         return ended
 
     def swarm(self, bounds: ArrayLike, rng: Generator, *, x0: ArrayLike | None = None) -> Swarm:
@@ -135,7 +136,8 @@ class ParticleSwarm(Method):
             checked_x0(x0, box),
         )
 
-    def _flight(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
+    def _search(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
+        run.keep(swarm)
         unseen = 0  # iterations in a row without a particle inside
         inside = self.boundary != "none"
         while True:
@@ -155,6 +157,7 @@ class ParticleSwarm(Method):
                         f"all particles stayed outside the bounds for {_LOST} iterations",
                     )
             run.nit += 1
+            run.checkpoint()
             if swarm.collapsed:
                 return Status.CONVERGED, "the swarm has collapsed to one point"
             if self.stagnation is not None and swarm.idle >= self.stagnation:

@@ -6,13 +6,11 @@ bit by bit.
 
 from __future__ import annotations
 
-import json
 import sys
-import zlib
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.random import Generator
@@ -20,8 +18,8 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
 from trajopt.optimize.base import FEASIBLE, best_index, better
+from trajopt.optimize.state import read_state, write_state
 
 _COLLAPSED = 1e-15  # of the width: spread and velocity at which a swarm has come to rest
 _ARRAYS = ("bounds", "x", "v", "own", "own_cost", "own_violation")
@@ -151,26 +149,30 @@ class Swarm:
     # -- saving
     # ---------------------------------------------------------------------------------------
 
+    def pack(self) -> dict[str, Any]:
+        """The whole state: arrays and plain values."""
+        return {
+            "rules": asdict(self.rules),
+            "iteration": self.iteration,
+            "idle": self.idle,
+            "rng": self.rng.bit_generator.state,
+            **{name: getattr(self, name) for name in _ARRAYS},
+        }
+
+    def unpack(self, kept: Mapping[str, Any]) -> None:
+        """Go on from what ``pack`` gave."""
+        if kept["rules"] != asdict(self.rules) or kept["x"].shape != self.x.shape:
+            raise ValueError(f"a swarm with the rules {kept['rules']}")
+        for name in _ARRAYS:
+            getattr(self, name)[:] = kept[name]
+        self.rng.bit_generator.state = kept["rng"]
+        self.iteration, self.idle = kept["iteration"], kept["idle"]
+        self.__post_init__()
+
     def save(self, path: str | Path) -> None:
         """Write the whole state to ``path`` (*.npz), under a temporary name first; ``load`` goes on
         from it."""
-        target = Path(path)
-        state = json.dumps(
-            {
-                "rules": asdict(self.rules),
-                "iteration": self.iteration,
-                "idle": self.idle,
-                "rng": self.rng.bit_generator.state,
-            },
-            default=_plain,
-        )
-        with whole_file(target) as part, part.open("wb") as file:
-            np.savez(
-                file,
-                allow_pickle=False,
-                state=np.array(state),
-                **{name: getattr(self, name) for name in _ARRAYS},
-            )
+        write_state(path, self.pack())
 
     @classmethod
     def load(cls, path: str | Path) -> Swarm:
@@ -178,39 +180,17 @@ class Swarm:
 
         Raises ArgumentError for a file that is missing or no saved swarm.
         """
+        kept = read_state(path, "Swarm.save")
         try:
-            with np.load(path, allow_pickle=False) as data:
-                state = json.loads(str(data["state"]))
-                arrays = [data[name] for name in _ARRAYS]
-            kind = getattr(np.random, state["rng"]["bit_generator"])()
-            kind.state = _restored(state["rng"])
-            rules = SwarmRules(**state["rules"])
-        except (
-            OSError,
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            EOFError,
-            BadZipFile,
-            zlib.error,
-        ) as error:
+            rng = Generator(getattr(np.random, kept["rng"]["bit_generator"])())
+            arrays = [kept[name] for name in _ARRAYS]
+            found = cls(SwarmRules(**kept["rules"]), arrays[0], rng, *arrays[1:])
+            found.unpack(kept)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ArgumentError(
                 "path", str(path), f"a file written by Swarm.save ({error})"
             ) from None
-        bounds, x, v, own, cost, violation = arrays
-        return cls(
-            rules,
-            bounds,
-            Generator(kind),
-            x,
-            v,
-            own,
-            cost,
-            violation,
-            state["iteration"],
-            state["idle"],
-        )
+        return found
 
     # -- one iteration
     # --------------------------------------------------------------------------------
@@ -339,6 +319,12 @@ def _bring_back(
     x[rows, columns] = np.minimum(np.maximum(at, least), most)
 
 
+def warm() -> None:
+    """Load or compile what ``Swarm`` will use."""
+    if (kernel := _kernel()) is not None:
+        kernel.warm()
+
+
 def _kernel() -> Any:
     """The compiled iteration where numba has been loaded already (by a compiled objective, say);
     else None.
@@ -371,20 +357,3 @@ def _positions(rules: SwarmRules, bounds: Array, rng: Generator) -> Array:
         x[:, 0] = low[0] + width[0] * (i // 10 % columns + 1) / (columns + 1)
         x[:, 1] = low[1] + width[1] * (i % 10 + 1) / 11
     return np.asarray(x)
-
-
-def _plain(value: object) -> object:
-    """NumPy values of a random generator's state as JSON."""
-    if isinstance(value, np.ndarray):
-        return {"dtype": str(value.dtype), "values": value.tolist()}
-    if isinstance(value, np.integer):
-        return int(value)
-    raise TypeError(f"{type(value).__name__} in the state of a random generator")
-
-
-def _restored(value: object) -> object:
-    if isinstance(value, dict):
-        if set(value) == {"dtype", "values"}:
-            return np.array(value["values"], dtype=value["dtype"])
-        return {key: _restored(entry) for key, entry in value.items()}
-    return value

@@ -20,7 +20,13 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array, BoolArray, as_numbers, require_positive, require_whole
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
-from trajopt.optimize.ipopt import numpy_on_symbols, smooth_table, solve_program, stacked, variables
+from trajopt.optimize.symbols import (
+    numpy_on_symbols,
+    smooth_table,
+    solve_program,
+    stacked,
+    variables,
+)
 from trajopt.timing.stages import Stages, assemble
 from trajopt.timing.trajectory import Trajectory
 
