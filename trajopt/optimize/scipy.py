@@ -169,7 +169,7 @@ class ScipyGlobal:
     """A global method of scipy.optimize with its own defaults, until it or the budget ends.
 
     "differential-evolution" (``population`` as popsize), "dual-annealing" (generalised annealing
-    and L-BFGS-B) or "direct" (division of rectangles, locally biased; starts in the middle, x0 is
+    and L-BFGS-B) or "direct" (division of rectangles, locally biased [gablonsky2001]; starts in the middle, x0 is
     only evaluated first).
     """
 
