@@ -30,6 +30,10 @@ class OnTerminal:
     def constrained(self) -> bool:
         return True
 
+    def prepare(self) -> None:
+        """Compile what evaluations use, which is no part of a search."""
+        self.terminal.prepare()
+
     def path(self, candidate: Array) -> Path:
         """The path through the control points of one candidate (d,)."""
         return self.terminal.path(candidate)

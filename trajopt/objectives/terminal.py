@@ -159,6 +159,11 @@ class TerminalObjective(TerminalVariables):
             return Evaluation(plan.cost(candidates, goal), np.zeros(len(candidates)))
         return self.evaluate_readable(candidates)
 
+    def prepare(self) -> None:
+        """Compile what ``evaluate`` and ``score`` use, which is no part of a search."""
+        self.evaluate(self.default[None])
+        self.score(self.default)
+
     def evaluate_readable(self, candidates: Array) -> Evaluation:
         """The same from the named terms: what compiled and affine short cuts are tested against."""
         z = np.asarray(candidates, dtype=np.float64).T

@@ -56,6 +56,7 @@ class FunctionObjective:
     constraints: tuple[Constraint, ...] = ()
     exact = True  # a search sees all there is: the score needs no call of its own
     doubt: bool = field(default=False, repr=False)  # a single candidate failed
+    _limits: Array | None = field(default=None, repr=False)
 
     @property
     def provides(self) -> frozenset[Capability]:
@@ -79,9 +80,11 @@ class FunctionObjective:
         if not self.constraints:
             return Evaluation(cost, free)
         found = [[c.values(row) for c in self.constraints] for row in candidates]
-        limits = [c.limits(len(v)) for c, v in zip(self.constraints, found[0], strict=True)]
         values = np.array([np.concatenate(row) for row in found])
-        return Evaluation(cost, free, values, np.concatenate(limits, axis=1))
+        if self._limits is None or self._limits.shape[1] != values.shape[1]:
+            parts = [c.limits(len(v)) for c, v in zip(self.constraints, found[0], strict=True)]
+            self._limits = np.concatenate(parts, axis=1)
+        return Evaluation(cost, free, values, self._limits)
 
     def cost(self, x: Array) -> float:
         """Cost of one candidate (d,)."""

@@ -9,7 +9,7 @@ of the program, fixed at each start to the nearest ones.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
@@ -27,7 +27,7 @@ from trajopt.optimize.base import Status
 from trajopt.optimize.functions import FunctionObjective
 from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
 from trajopt.optimize.newton import solve_residuals
-from trajopt.optimize.run import NoGradient, Run, Starts
+from trajopt.optimize.run import NoGradient, Run, Starts, onto_constraints, starting_points
 from trajopt.optimize.symbols import (
     Expressions,
     Nlp,
@@ -92,10 +92,9 @@ class Ipopt:
         status = Status.CONVERGED if exact else Status.NO_EXACT
         return status, f"{exact} of {starts.tried} starts exact"
 
-    def _starts(self, run: Run, x0: Array | None, rng: Generator) -> list[Array]:
-        """Lattice points by peak wheel rate, then x0 or the middle of the bounds, then random
-        points."""
-        found: list[Array] = []
+    def _starts(self, run: Run, x0: Array | None, rng: Generator) -> Iterator[Array]:
+        """x0; lattice points by peak wheel rate; then as other local methods."""
+        given = 0
         if self.lattice_starts and hasattr(run.objective, "affine_part"):
             objective = cast(LatticeObjective, run.objective)
             part = objective.affine_part()
@@ -104,15 +103,15 @@ class Ipopt:
                 points, _ = lattice_points(part, run.bounds[part.variables])
             candidates = np.tile(part.base, (len(points), 1))
             candidates[:, part.variables] = points
+            if x0 is not None:
+                yield x0
+                given, x0 = 1, None
             if len(points):
                 order = np.argsort(objective.effort(candidates), kind="stable")
-                found = list(candidates[order][: self.lattice_starts])
-        found.insert(
-            0 if x0 is not None else len(found), run.bounds.mean(axis=1) if x0 is None else x0
-        )
-        while len(found) < self.starts:
-            found.append(rng.uniform(run.bounds[:, 0], run.bounds[:, 1]))
-        return found[: self.starts]
+                for start in candidates[order][: self.lattice_starts]:
+                    yield start
+                    given += 1
+        yield from starting_points(run, x0, rng, self.starts - given)
 
 
 class _Program:
@@ -163,7 +162,7 @@ class _Program:
                 run.nhev += int(self.nlp.account.get("n_call_nlp_hess_l", 0))
         x = np.clip(x[:d], run.bounds[:, 0], run.bounds[:, 1])
         run.at(x)
-        return x, stats
+        return x if self.slacks else onto_constraints(run, x), stats
 
     def _of_objective(self, objective: SymbolicObjective, start: Array) -> Expressions:
         parameters, slacks = objective.parameters_at(start), objective.slacks_at(start)

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from typing import Any, NoReturn, cast
 
 import numpy as np
+from numpy.random import Generator
 
 from trajopt.arrays import Array, BoolArray
 from trajopt.objectives.base import Capability, Evaluation, Objective
@@ -41,7 +42,10 @@ Callback = Callable[[Array, float, float], Any]  # with the best x, its cost and
 
 _KEPT_SAMPLES = 50_000  # explored candidates kept for pictures
 _UNLIMITED = 2**62
+_NEARBY = 0.1  # of the width: standard deviation of starts near the best so far, chosen
 _PORTION = 0.02  # s that one call of a batch may take near the deadline, chosen
+_STEPS_BACK = 3  # onto constraints that are missed by little, chosen
+_LITTLE = 1e-2  # of the width, largest of those steps, chosen
 _APART = 1e-3  # of the width by which candidates differ that show how a function works, chosen
 _DIFFERENCE = 1.5e-8  # of the width: step of forward differences, square root of the rounding
 _ENDED_FROM_OUTSIDE = (Status.INTERRUPTED, Status.CALLBACK)
@@ -86,6 +90,7 @@ class Run:
     best_violation: float = np.inf
     limits: Array | None = None  # (2, m): between what constraints are kept, once one was computed
     _rank: float = np.inf  # the best candidate's violation as Deb's rule sees it
+    _rounding: Array = field(default_factory=lambda: np.zeros(0))  # (m,)
     _scale: Array = field(default_factory=lambda: np.zeros(0))  # (m,) first excess of constraints
     _proposals: list[Array] = field(default_factory=list)
     _rows: list[tuple[int, float, float, float]] = field(default_factory=list)
@@ -248,21 +253,18 @@ class Run:
             np.where(bad, np.inf, cost), np.where(bad, np.inf, violation), values, limits
         )
 
-    def _violations(self, found: Evaluation, rows: Array, inside: bool) -> tuple[Evaluation, Array]:
+    def _violations(
+        self, found: Evaluation, rows: Array, inside: bool
+    ) -> tuple[Evaluation, Array]:
         """With violations as Deb's rule is to see them, and the worst excess itself, each (n,)."""
         rank = worst = found.violation
         if found.constraints is not None and found.limits is not None:
-            self.limits = found.limits
-            low, high = found.limits
-            excess = np.maximum(low - found.constraints, found.constraints - high)
-            excess = np.maximum(np.where(np.isnan(excess), np.inf, excess), 0.0)
-            worst = excess.max(axis=1, initial=0.0)
-            if len(self._scale) != excess.shape[1]:
-                self._scale = np.zeros(excess.shape[1])
-            seen = np.where(np.isfinite(excess), excess, 0.0).max(axis=0, initial=0.0)
-            self._scale = np.where(self._scale > 0, self._scale, seen)
-            parts = excess / np.where(self._scale > 0, self._scale, 1.0)
-            rank = np.where(worst <= FEASIBLE, 0.0, parts.sum(axis=1))
+            if self.limits is not found.limits:
+                self.limits, self._rounding = found.limits, _rounding(found.limits)
+            excess = _excess(found.constraints, found.limits, self._rounding)
+            rank = worst = excess.max(axis=1, initial=0.0)
+            if worst.any():
+                rank = self._rank_of(excess, worst)
         if not inside and ((rows < self._low).any() or (rows > self._high).any()):
             outside = np.maximum(self._low - rows, rows - self._high)
             outside = np.maximum(outside, 0.0).sum(axis=1)
@@ -270,6 +272,17 @@ class Run:
         if rank is not found.violation:
             found = Evaluation(found.cost, rank, found.constraints, found.limits)
         return found, worst
+
+    def _rank_of(self, excess: Array, worst: Array) -> Array:
+        """(n,): the sum of violations (n, m), each as a multiple of the first one seen."""
+        if len(self._scale) != excess.shape[1]:
+            self._scale = np.zeros(excess.shape[1])
+        if not self._scale.all():
+            seen = np.where(np.isfinite(excess), excess, 0.0).max(axis=0)
+            self._scale = np.where(self._scale > 0, self._scale, seen)
+        parts = excess / np.where(self._scale > 0, self._scale, 1.0)
+        # However small the share of the first: what is broken must not count as rounding.
+        return np.where(worst > 0, 2 * FEASIBLE + parts.sum(axis=1), 0.0)
 
     def _record(self, rows: Array, found: Evaluation, worst: Array) -> None:
         before = self.nfev
@@ -606,6 +619,68 @@ class Starts:
         """The status of the start that found the best, and a sentence on all."""
         status = Status.CONVERGED if self.converged else Status.STALLED
         return status, f"{self.kept} of {self.tried} starts converged; the best said '{self.said}'"
+
+
+def starting_points(run: Run, x0: Array | None, rng: Generator, count: int) -> Iterator[Array]:
+    """``count`` points (d,) where local searches begin: x0; the objective's own (``starts``), the
+    best of them first, or else the middle; then random ones, every other near the best so far."""
+    given = 0
+    if x0 is not None:
+        yield x0
+        given = 1
+    own = getattr(run.objective, "starts", None)
+    found = run.bounds.mean(axis=1)[None] if own is None else own()
+    if own is not None:
+        seen = run.evaluate(found)
+        found = found[np.lexsort((seen.cost, seen.violation))]
+    for start in found if own is not None or x0 is None else ():
+        if given < count:
+            yield start
+            given += 1
+    low, high = run.bounds.T
+    for index in range(count - given):
+        if index % 2 and run.best_x is not None:
+            step = _NEARBY * run.width * rng.standard_normal(len(low))
+            yield np.clip(run.best_x + step, low, high)
+        else:
+            yield rng.uniform(low, high)
+
+
+def _rounding(limits: Array) -> Array:
+    """(m,): by how much constraints may miss their limits and count as kept."""
+    finite = np.where(np.isfinite(limits), np.abs(limits), 0.0)
+    return np.asarray(FEASIBLE * np.maximum(1.0, finite.max(axis=0)))
+
+
+def _excess(values: Array, limits: Array, rounding: Array) -> Array:
+    """(n, m): by how much constraints (n, m) are broken; 0 where it is but rounding, inf where they
+    could not be computed."""
+    excess = np.asarray(np.maximum(limits[0] - values, values - limits[1]))
+    excess[excess <= rounding] = 0.0
+    excess[np.isnan(excess)] = np.inf
+    return excess
+
+
+def onto_constraints(run: Run, x: Array) -> Array:
+    """``x`` (d,), where a local method ended, moved the shortest way (on the scale of the bounds)
+    onto the constraints that it breaks by little, as such methods do."""
+    for _ in range(_STEPS_BACK):
+        here = run.at(x)
+        if here.constraints is None or here.limits is None or run.remaining() < 2:
+            return x
+        excess = _excess(here.constraints, here.limits, _rounding(here.limits))[0]
+        broken = excess > 0
+        if not broken.any() or not np.isfinite(excess).all():
+            return x
+        below = here.constraints[0] < here.limits[0]
+        target = np.where(below, here.limits[0], here.limits[1]) - here.constraints[0]
+        rows = run.derivatives(x)[1][broken] * run.width
+        step = np.linalg.lstsq(rows, target[broken], rcond=1e-10)[0]
+        if np.abs(step).max() > _LITTLE:
+            return x
+        x = np.clip(x + run.width * step, *run.bounds.T)
+    run.at(x)
+    return x
 
 
 def _joined(parts: list[Evaluation]) -> Evaluation:

@@ -18,12 +18,14 @@ from numpy.random import Generator
 from trajopt.arrays import Array, BoolArray
 from trajopt.objectives.base import Capability, ResidualObjective
 from trajopt.optimize.base import FEASIBLE, Status
-from trajopt.optimize.run import NoGradient, Run, Starts
+from trajopt.optimize.run import NoGradient, Run, Starts, onto_constraints, starting_points
 
 _LARGE = 1e100  # stands for an infeasible evaluation, since line searches cannot work with inf
 _FAR = 1e10  # by which constraints count as broken where they could not be computed
 _FLAT = 1e-6  # slope, a width of the bounds and a unit of cost, that counts as none; chosen
 _NEAR = 1e-7  # by which a constraint may be missed and still holds a search back, chosen
+# Iterations from one of many starts, chosen.
+_OF_MANY = {"SLSQP": 100, "trust-constr": 300, "COBYQA": 300}
 _FIRST_STEP = 0.1  # of the width: first step of methods without derivatives, chosen
 
 Method = Literal["SLSQP", "L-BFGS-B", "trust-constr", "COBYQA", "Nelder-Mead"]
@@ -68,18 +70,16 @@ class ScipyLocal:
         assert scipy.linalg
         run.constructed()
         starts = Starts(run)
-        for index in range(self.starts):
-            unit = (
-                np.full(len(run.bounds), 0.5) if x0 is None else (x0 - run.bounds[:, 0]) / run.width
-            )
-            if index > 0:
-                unit = rng.random(len(unit))
+        for start in starting_points(run, x0, rng, self.starts):
+            unit = (start - run.bounds[:, 0]) / run.width
             try:
                 result = self._from(optimize, run, unit)
-            except NoGradient as error:
+            except (NoGradient, ValueError, ArithmeticError) as error:  # SciPy's own, too
                 starts.ended(False, str(error))
                 continue
             run.nit += int(getattr(result, "nit", 0))
+            if self.differentiates:
+                onto_constraints(run, run.bounds[:, 0] + run.width * result.x)
             converged = bool(result.success) or self._settled(optimize, run, result.x)
             starts.ended(converged, str(result.message))
         return starts.verdict()
@@ -93,7 +93,9 @@ class ScipyLocal:
         def gradient(u: Array) -> Array:
             return np.asarray(run.derivatives(low + run.width * u)[0] * run.width)
 
-        options: dict[str, Any] = {"maxiter": 10_000, **_OPTIONS.get(self.method, {})}
+        # Where an objective offers many starts, none is to hold the others up.
+        most = _OF_MANY[self.method] if hasattr(run.objective, "starts") else 10_000
+        options: dict[str, Any] = {"maxiter": most, **_OPTIONS.get(self.method, {})}
         if self.method == "COBYQA":
             options["maxfev"] = min(run.remaining() + 1, 10_000_000)
         if self.method == "Nelder-Mead":
@@ -103,6 +105,7 @@ class ScipyLocal:
         with warnings.catch_warnings():
             # trust-constr warns where a gradient stays, as on piecewise linear costs, and where
             # gradients of constraints depend on each other.
+            warnings.simplefilter("ignore", RuntimeWarning)
             warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
             warnings.filterwarnings("ignore", "Singular Jacobian matrix", UserWarning)
             return optimize.minimize(
@@ -397,7 +400,7 @@ def l_bfgs_b() -> ScipyLocal:
 
 def trust_constr() -> ScipyLocal:
     """Trust-region method for constrained problems."""
-    return ScipyLocal("trust-constr", starts=3)
+    return ScipyLocal("trust-constr")
 
 
 def cobyqa() -> ScipyLocal:

@@ -1,6 +1,6 @@
 """Slow objectives on several workers: processes, any executor, or a Dask cluster.
 
-Candidates go out one by one, at most as many at a time as there are workers, so that a search stops
+Candidates go out one by one, about as many at a time as there are workers, so that a search stops
 within one evaluation. Answers count in the order of the candidates, whichever comes first: the bits
 are those of a search without workers.
 """
@@ -27,7 +27,7 @@ _objective: Objective | None = None  # in a worker process: what it evaluates
 
 @dataclass
 class Pool:
-    """``count`` workers of ``executor``; ``own`` where it is ours to shut down."""
+    """``count`` candidates at a time go to ``executor``; ``own`` where it is ours to shut down."""
 
     executor: Any
     count: int
@@ -44,8 +44,9 @@ class Pool:
             if count >= 1:
                 return cls(_processes(count, objective), count, own=True)
         elif hasattr(workers, "get_executor"):  # a Dask client
+            # One candidate more than there are threads waits at each, or the way there costs time.
             threads = sum(workers.nthreads().values())
-            return cls(workers.get_executor(), max(threads, 1), own=False)
+            return cls(workers.get_executor(pure=False), max(2 * threads, 1), own=False)
         elif hasattr(workers, "submit"):
             count = int(getattr(workers, "_max_workers", 0) or os.cpu_count() or 1)
             return cls(workers, count, own=False)
@@ -70,9 +71,13 @@ class Pool:
                     while sent < len(rows) and len(running) < self.count:
                         if sent and late():
                             rows = rows[:sent]
+                            for one in [one for one in running if one.cancel()]:
+                                del running[one]
                             break
                         running[self._submit(objective, rows[sent : sent + 1])] = sent
                         sent += 1
+                    if not running:
+                        break
                     for one in futures.wait(running, None, futures.FIRST_COMPLETED).done:
                         answers[running.pop(one)] = one.exception() or one.result()
                 except KeyboardInterrupt as interrupt:
