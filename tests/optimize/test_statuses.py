@@ -16,9 +16,10 @@ from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.objectives.base import Evaluation
 from trajopt.optimize.base import Budget, Status
 from trajopt.optimize.pso import ParticleSwarm
-from trajopt.optimize.run import Run, Starts
+from trajopt.optimize.run import Run
 from trajopt.optimize.scipy import ScipyLocal
 from trajopt.optimize.search import minimize, optimizer_names
+from trajopt.optimize.starts import Starts
 
 BOX = np.array([[-2.0, 3.0], [-1.5, 2.5]])
 
@@ -82,7 +83,7 @@ def test_budgets_hold_on_objectives_of_every_kind(name: str, problem: str) -> No
 
 
 def test_ipopt_counts_gradients_and_hessians() -> None:
-    objective, bounds = objective_named("corridor/1/length")
+    objective, bounds = objective_named("asoc/dry_sand")
     found = minimize(objective, bounds, optimizer="ipopt", budget=Budget(300))
     assert found.nhev > 0
     assert found.ngev > 0

@@ -141,6 +141,18 @@ class Optimizer(Protocol):
         ...
 
 
+class Stop(Exception):
+    """Ends the search: raised inside the run, and caught by it."""
+
+    def __init__(self, status: Status, said: str = "") -> None:
+        super().__init__(said or status.value)
+        self.status, self.said = status, said
+
+
+class StageOver(Stop):
+    """Ends one stage of a search, whose share of the budget is used up."""
+
+
 def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:
     """Deb's feasibility rule [deb2000]: feasible before infeasible, then the cost, or else the
     violation, decides."""

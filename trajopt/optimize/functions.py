@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,31 +11,15 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability, Evaluation, Objective
-
-_PROBED = 3  # candidates handed over together to see whether a function takes batches, chosen
-_FORMS = (
-    "SciPy's NonlinearConstraint or LinearConstraint, a pair of functions (g, its Jacobian or None) "
-    'for g(x) >= 0, or ("ineq" or "eq", g) or ("eq", g, Jacobian)'
+from trajopt.optimize.constraints import (
+    Constraint,
+    constraint,
+    constraint_list,
+    numbers,
+    of_casadi,
 )
 
-
-@dataclass(frozen=True)
-class Constraint:
-    """``lower`` <= function(x) <= ``upper``, one or several numbers; ``jacobian`` (k, d) where it
-    is known."""
-
-    function: Callable[[Any], Any]
-    lower: Any = 0.0
-    upper: Any = np.inf
-    jacobian: Callable[[Any], Any] | None = None
-
-    def values(self, x: Array) -> Array:
-        """(k,)"""
-        return _numbers(self.function(x), "a constraint").ravel()
-
-    def limits(self, count: int) -> Array:
-        """(2, k)"""
-        return np.stack([np.broadcast_to(np.ravel(v), count) for v in (self.lower, self.upper)])
+_PROBED = 3  # candidates handed over together to see whether a function takes batches, chosen
 
 
 @dataclass
@@ -73,7 +56,7 @@ class FunctionObjective:
 
     def evaluate(self, candidates: Array) -> Evaluation:
         if self.batch:
-            cost = _numbers(self.function(candidates, *self.arguments), "the objective")
+            cost = numbers(self.function(candidates, *self.arguments), "the objective")
         else:
             cost = np.array([self.cost(row) for row in candidates])
         free = np.zeros(cost.shape)
@@ -101,14 +84,14 @@ class FunctionObjective:
     def gradient(self, x: Array) -> Array:
         """(d,): gradient of the cost, where one was given."""
         if self.gradient_of is True:
-            return _numbers(self.function(x, *self.arguments)[1], "the gradient")
+            return numbers(self.function(x, *self.arguments)[1], "the gradient")
         assert callable(self.gradient_of)
-        return _numbers(self.gradient_of(x, *self.arguments), "the gradient")
+        return numbers(self.gradient_of(x, *self.arguments), "the gradient")
 
     def jacobian(self, x: Array) -> Array:
         """(m, d): gradients of the constraints, where all were given."""
         parts = [
-            _numbers(c.jacobian(x), "a constraint's Jacobian").reshape(-1, len(x))
+            numbers(c.jacobian(x), "a constraint's Jacobian").reshape(-1, len(x))
             for c in self.constraints
             if c.jacobian is not None
         ]
@@ -126,19 +109,19 @@ def as_objective(
 ) -> Objective:
     """The objective itself, or a plain function (or a function or expression of CasADi) wrapped as
     one. Raises ArgumentError for what cannot be called or used."""
-    items = _constraint_list(constraints)
+    items = constraint_list(constraints)
     if isinstance(objective, Objective):
         for name, value in (("jac", jac), ("constraints", items or None), ("args", args or None)):
             if value is not None:
                 expected = "none: this objective brings its own"
                 raise ArgumentError(name, value, expected)
         return objective
-    if any(map(_of_casadi, [objective, *items])):
+    if any(map(of_casadi, [objective, *items])):
         from trajopt.optimize.symbols import casadi_callable
 
-        symbols = [v for v in [objective, *items] if _of_casadi(v)]
+        symbols = [v for v in [objective, *items] if of_casadi(v)]
         objective, *items = (
-            casadi_callable(v, len(bounds), symbols) if _of_casadi(v) else v
+            casadi_callable(v, len(bounds), symbols) if of_casadi(v) else v
             for v in (objective, *items)
         )
     if not callable(objective):
@@ -147,7 +130,7 @@ def as_objective(
     jac = getattr(objective, "gradient", None) if jac is None else jac
     if not (jac is None or isinstance(jac, bool) or callable(jac)):
         raise ArgumentError("jac", jac, "a function that gives the gradient (d,), True or None")
-    found = tuple(_constraint(item) for item in items)
+    found = tuple(constraint(item) for item in items)
     # A gradient or constraints are given for single candidates: then the cost is too.
     single = bool(jac or found)
     return FunctionObjective(
@@ -170,7 +153,7 @@ def settled(
     if allowed < len(some) + 2 and not (function.doubt and allowed > 1):
         return 0
     try:
-        together = _numbers(function.function(some.copy(), *function.arguments), "the objective")
+        together = numbers(function.function(some.copy(), *function.arguments), "the objective")
     except Exception:  # a scalar function may fail in any way on a matrix
         together = np.zeros(0)
     if together.shape != (len(some),):
@@ -189,103 +172,10 @@ def settled(
     return spent
 
 
-def _constraint_list(given: Any) -> list[Any]:
-    """The constraints in what was given: one or several."""
-    if given is None:
-        return []
-    one = callable(given) or _of_scipy(given) or _of_casadi(given) or isinstance(given, Mapping)
-    if isinstance(given, tuple) and given and not one:
-        # one pair, not a sequence of constraints
-        text = isinstance(given[0], str)
-        one = text or (len(given) == 2 and callable(given[0]) and _is_jacobian(given[1]))
-    if not (one or isinstance(given, Iterable)):
-        raise ArgumentError("constraints", given, f"one or several of {_FORMS}")
-    return [given] if one else list(given)
-
-
-def _is_jacobian(second: Any) -> bool:
-    """Two functions are one constraint and its Jacobian: lists hold several constraints."""
-    return second is None or (callable(second) and not _of_casadi(second))
-
-
-def _constraint(item: Any) -> Constraint:
-    """One constraint from any of its forms."""
-    if isinstance(item, Constraint):
-        return item
-    if _of_scipy(item):
-        return _from_scipy(item)
-    if isinstance(item, Mapping):
-        item = (item.get("type"), _with_args(item, "fun"), _with_args(item, "jac"))
-    if callable(item):
-        return Constraint(item, jacobian=getattr(item, "gradient", None))
-    if isinstance(item, tuple) and len(item) in (2, 3):
-        kind, function, jacobian = (
-            (*item, None)[:3] if isinstance(item[0], str) else ("ineq", *item)[:3]
-        )
-        if (
-            kind in ("ineq", "eq")
-            and callable(function)
-            and (jacobian is None or callable(jacobian))
-        ):
-            own = getattr(function, "gradient", None) if jacobian is None else jacobian
-            return Constraint(function, 0.0, 0.0 if kind == "eq" else np.inf, own)
-    raise ArgumentError("constraints", item, _FORMS)
-
-
-def _with_args(item: Mapping[str, Any], key: str) -> Any:
-    function, args = item.get(key), tuple(item.get("args", ()))
-    return (lambda x: function(x, *args)) if args and callable(function) else function
-
-
-def _from_scipy(item: Any) -> Constraint:
-    if np.any(item.keep_feasible):
-        expected = "False: searches may pass through infeasible candidates"
-        raise ArgumentError("constraints.keep_feasible", item.keep_feasible, expected)
-    if hasattr(item, "A"):
-        matrix = np.atleast_2d(item.A.toarray() if hasattr(item.A, "toarray") else item.A)
-        return Constraint(lambda x: matrix @ x, item.lb, item.ub, lambda _: matrix)
-    if not callable(item.jac) and not isinstance(item.jac, str):
-        raise ArgumentError("constraints.jac", item.jac, "a function, or left out")
-    if callable(item.hess):
-        expected = "left out: second derivatives of constraints are approximated"
-        raise ArgumentError("constraints.hess", item.hess, expected)
-    jacobian = item.jac if callable(item.jac) else getattr(item.fun, "gradient", None)
-    return Constraint(item.fun, item.lb, item.ub, jacobian)
-
-
-def _of_scipy(item: Any) -> bool:
-    module = sys.modules.get("scipy.optimize")
-    return module is not None and isinstance(
-        item, (module.NonlinearConstraint, module.LinearConstraint)
-    )
-
-
-def _of_casadi(item: Any) -> bool:
-    return type(item).__module__.startswith("casadi") and not isinstance(item, type)
-
-
 def _number(value: Any) -> float:
-    array = _numbers(value, "the objective")
+    array = numbers(value, "the objective")
     if array.size != 1:
         raise ValueError(
             f"the objective returned shape {array.shape} for one candidate; expected a number"
         )
     return float(array.reshape(()))
-
-
-def _numbers(value: Any, who: str) -> Array:
-    """As an array of real numbers. Raises ValueError for None, text, masked values and the like."""
-    if type(value) is float:  # the usual case, and quick
-        return np.float64(value)  # type: ignore[return-value]
-    if value is None:
-        raise ValueError(f"{who} returned None; does it end without 'return'?")
-    if np.ma.is_masked(value):
-        raise ValueError(f"{who} returned a masked value: {value!r}")
-    array = np.asarray(value)
-    if array.dtype == object:
-        if any(v is None for v in array.ravel()):
-            raise ValueError(f"{who} returned None among its values")
-        array = array.astype(np.float64)
-    if array.dtype.kind not in "biuf":
-        raise ValueError(f"{who} returned {value!r} ({array.dtype}); expected real numbers")
-    return np.asarray(array, dtype=np.float64)

@@ -23,18 +23,15 @@ from trajopt.objectives.base import (
     ResidualObjective,
     SymbolicObjective,
 )
-from trajopt.optimize.base import Status
+from trajopt.optimize.base import Status, Stop
+from trajopt.optimize.derivatives import NoGradient, onto_constraints
 from trajopt.optimize.functions import FunctionObjective
 from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
 from trajopt.optimize.newton import solve_residuals
-from trajopt.optimize.run import NoGradient, Run, Starts, onto_constraints, starting_points
-from trajopt.optimize.symbols import (
-    Expressions,
-    Nlp,
-    expressions,
-    function_in_symbols,
-    values_of,
-)
+from trajopt.optimize.nlp import Nlp
+from trajopt.optimize.run import Run
+from trajopt.optimize.starts import Starts, starting_points
+from trajopt.optimize.symbols import Expressions, expressions, function_in_symbols, values_of
 
 _LARGE = 1e100  # stands for an infeasible evaluation
 _BY_DIFFERENCES = 1e-7  # least tolerance where derivatives carry rounding, chosen
@@ -200,16 +197,19 @@ def _of_function(
     run: Run, function: FunctionObjective, start: Array, cost: float
 ) -> Expressions | None:
     """A plain function in symbols, where it runs on them and gives there what it gives for numbers.
-    The call with symbols counts as an evaluation."""
-    if run.remaining() < 2 or function.gradient_of is True:
+    Calls with symbols count as evaluations."""
+    if run.remaining() < 3 or function.gradient_of is True:
         return None
-    run.spend(1)
     functions = [lambda x: function.function(x, *function.arguments)]
     try:
         written = function_in_symbols(
-            [*functions, *(c.function for c in function.constraints)], len(start)
+            [*functions, *(c.function for c in function.constraints)],
+            len(start),
+            lambda: run.spend(1),
         )
         told, rows = values_of(written)(start, np.zeros(0))
+    except Stop:
+        raise
     except Exception:  # a function may fail in any way on symbols
         return None
     m = 0 if run.limits is None else run.limits.shape[1]

@@ -38,9 +38,9 @@ OPTIMIZERS: dict[str, tuple[str, str]] = {
     "trust-constr": ("trajopt.optimize.scipy", "trust_constr"),
     "cobyqa": ("trajopt.optimize.scipy", "cobyqa"),
     "nelder-mead": ("trajopt.optimize.scipy", "nelder_mead"),
-    "differential-evolution": ("trajopt.optimize.scipy", "differential_evolution"),
-    "dual-annealing": ("trajopt.optimize.scipy", "dual_annealing"),
-    "direct": ("trajopt.optimize.scipy", "direct"),
+    "differential-evolution": ("trajopt.optimize.scipy_global", "differential_evolution"),
+    "dual-annealing": ("trajopt.optimize.scipy_global", "dual_annealing"),
+    "direct": ("trajopt.optimize.scipy_global", "direct"),
     "least-squares": ("trajopt.optimize.scipy", "LeastSquares"),
     "cma-es": ("trajopt.optimize.cma_es", "CmaEs"),
 }

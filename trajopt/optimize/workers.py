@@ -117,7 +117,7 @@ def _processes(count: int, objective: Objective) -> futures.ProcessPoolExecutor:
 
 def _begin(objective: Objective) -> None:
     global _objective
-    from trajopt.optimize.threads import one_thread
+    from trajopt.optimize.process import one_thread
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the main process decides when to stop
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
