@@ -120,6 +120,19 @@ def test_corridors_are_solved_as_well_as_by_hand(corridor: int, length: float, s
         found = minimize(objective, objective.bounds, optimizer=name, seed=seed, budget=budget)
         assert found.fun <= length
         assert found.violation == 0.0
+    swarm = minimize(objective, objective.bounds, seed=seed, optimizer="pso")
+    assert swarm.fun <= 1.001 * length
+    assert swarm.violation == 0.0
+
+
+@pytest.mark.parametrize(("corridor", "length"), [(1, 12.67), (2, 12.4656)])
+def test_trust_constr_solves_corridors(corridor: int, length: float) -> None:
+    """Its inner steps end before the optimum of the first corridor, 0.1 % above."""
+    objective = random_corridor(corridor, "length")
+    budget = Budget(3_000, target=length)
+    found = minimize(objective, objective.bounds, optimizer="trust-constr", budget=budget)
+    assert found.fun <= length
+    assert found.violation == 0.0
 
 
 def test_starts_pass_each_obstacle_on_either_side() -> None:

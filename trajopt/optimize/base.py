@@ -153,10 +153,16 @@ class StageOver(Stop):
     """Ends one stage of a search, whose share of the budget is used up."""
 
 
-def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:
+def better(
+    cost: float,
+    violation: float,
+    than_cost: float,
+    than_violation: float,
+    level: float = FEASIBLE,
+) -> bool:
     """Deb's feasibility rule [deb2000]: feasible before infeasible, then the cost, or else the
-    violation, decides."""
-    feasible, than_feasible = violation <= FEASIBLE, than_violation <= FEASIBLE
+    violation, decides. Violations up to ``level`` count as none (epsilon levels [takahama2006])."""
+    feasible, than_feasible = violation <= level, than_violation <= level
     if feasible and than_feasible:
         return bool(cost < than_cost)
     if feasible or than_feasible:
@@ -164,11 +170,11 @@ def better(cost: float, violation: float, than_cost: float, than_violation: floa
     return bool(violation < than_violation or (violation == than_violation and cost < than_cost))
 
 
-def best_index(cost: Array, violation: Array) -> int:
-    """Index of the best candidate under Deb's rule."""
+def best_index(cost: Array, violation: Array, level: float = FEASIBLE) -> int:
+    """Index of the best candidate as ``better`` sees it."""
     if not np.count_nonzero(violation):  # the usual case, and quick
         return int(cost.argmin())
-    feasible = violation <= FEASIBLE
+    feasible = violation <= level
     if feasible.any():
         return int(np.argmin(np.where(feasible, cost, np.inf)))
     return int(np.lexsort((cost, violation))[0])

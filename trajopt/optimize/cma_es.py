@@ -26,6 +26,7 @@ from trajopt.arrays import Array
 from trajopt.objectives.base import Capability
 from trajopt.optimize.base import FEASIBLE, Status
 from trajopt.optimize.run import Run
+from trajopt.optimize.violations import Levels
 
 _RELATIVE_X = 1e-12  # of the first step size: spread at which a search has converged; pycma's 1e-11
 _FLAT = 1e-12  # spread of costs at which it has; pycma's tolfun is 1e-11
@@ -168,7 +169,7 @@ class CmaEs:
 
 class _Restarts:
     def __init__(self, options: CmaEs, run: Run, x0: Array | None, rng: Generator) -> None:
-        self.options, self.run, self.rng = options, run, rng
+        self.options, self.run, self.rng, self.levels = options, run, rng, Levels(run)
         self.begin(0, None if x0 is None else (x0 - run.bounds[:, 0]) / run.width)
 
     def begin(self, restart: int, start: Array | None) -> None:
@@ -182,7 +183,7 @@ class _Restarts:
         run, strategy = self.run, self.strategy
         x = run.bounds[:, 0] + run.width * strategy.ask()
         found = run.evaluate(np.minimum(x, run.bounds[:, 1]), inside=True)
-        strategy.learn(found.cost, found.violation)
+        strategy.learn(found.cost, found.violation, self.levels.at(found.violation))
         run.nit += 1
         if strategy.ended:
             self.begin(self.restart + 1, None)

@@ -29,11 +29,15 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
 from trajopt.optimize.base import Status, checked_bounds, checked_x0
+from trajopt.optimize.derivatives import onto_constraints
 from trajopt.optimize.run import Run
 from trajopt.optimize.swarm import Swarm, SwarmRules, warm
+from trajopt.optimize.violations import Levels
 
 Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
+_REPAIRED = 10  # iterations between repairs of the best where there are equalities, chosen
+_CLAN = 0.03  # of the width: spread of a clan, chosen
 _CHOICES = {
     "topology": ("gbest", "ring"),
     "boundary": ("reset", "reflect", "mirror", "absorb", "invisible", "none"),
@@ -103,11 +107,15 @@ class ParticleSwarm:
         """Search until the budget ends or, without ``restart``, the swarm stagnates or collapses to
         one point.
 
-        ``x0`` (d,) becomes the first particle's position.
+        ``x0`` (d,) becomes the first particle's position; the last of the others begin around the
+        objective's own starts, where it has some.
         """
         warm()
         run.constructed()
-        ended = self._search(run, self.swarm(run.bounds, rng, x0=x0))
+        swarm = self.swarm(run.bounds, rng, x0=x0)
+        if self.start != "grid":
+            _clans(run, swarm)
+        ended = self._search(run, swarm)
         while self.restart:
             best = None if run.best_x is None else np.clip(run.best_x, *run.bounds.T)
             self._search(run, self.swarm(run.bounds, rng, x0=best))
@@ -140,13 +148,16 @@ class ParticleSwarm:
         run.keep(swarm)
         unseen = 0  # iterations in a row without a particle inside
         inside = self.boundary != "none"
+        levels = Levels(run)
         while True:
             asked = swarm.ask()
             if self.boundary != "invisible":
                 result = run.evaluate(asked, inside=inside)
+                swarm.level = levels.at(result.violation)
                 swarm.learn(result.cost, result.violation)
             elif len(asked):
                 result, unseen = run.evaluate(asked), 0
+                swarm.level = levels.at(result.violation)
                 swarm.tell(result.cost, result.violation)
             else:
                 swarm.tell(np.zeros(0))
@@ -157,11 +168,25 @@ class ParticleSwarm:
                         f"all particles stayed outside the bounds for {_LOST} iterations",
                     )
             run.nit += 1
+            if levels.first and run.nit % _REPAIRED == 0:
+                found = onto_constraints(run, swarm.best[0])
+                swarm.offer(found, run.at(found))
             run.checkpoint()
             if swarm.collapsed:
                 return Status.CONVERGED, "the swarm has collapsed to one point"
             if self.stagnation is not None and swarm.idle >= self.stagnation:
                 return Status.CONVERGED, f"no improvement in {self.stagnation} iterations"
+
+
+def _clans(run: Run, swarm: Swarm) -> None:
+    """Where the objective has starts of its own (routes on either side of obstacles), the last
+    particles begin around them, neighbours around the same one."""
+    if not hasattr(run.objective, "starts"):
+        return
+    own = run.objective.starts()[: len(swarm.x) // 2]
+    clans = np.repeat(own, len(swarm.x) // len(own), axis=0)
+    clans += _CLAN * run.width * swarm.rng.standard_normal(clans.shape)
+    swarm.x[len(swarm.x) - len(clans) :] = np.clip(clans, *run.bounds.T)
 
 
 def constriction() -> ParticleSwarm:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.errors import ArgumentError
+from trajopt.objectives.base import Evaluation
 from trajopt.optimize.base import FEASIBLE, best_index, better
 from trajopt.optimize.state import read_state, write_state
 
@@ -57,6 +58,7 @@ class Swarm:
     own_violation: Array
     iteration: int = 0
     idle: int = 0
+    level: float = FEASIBLE  # violation up to which candidates count as feasible
     _reached: tuple[float, float] = (np.inf, np.inf)
 
     def __post_init__(self) -> None:
@@ -73,6 +75,9 @@ class Swarm:
         self._pulls = np.empty((2, *self.x.shape))
         self._drawn = np.empty((2, *self.x.shape))
         self._leaders = np.zeros(len(self.x), dtype=np.intp)
+        self._places, reach = np.arange(len(self.x)), self.rules.neighbours
+        around = self._places[:, None] + np.arange(-reach, reach + 1)
+        self._ring = np.sort(around % len(self.x), axis=1)  # ties go to the lower index
 
     @classmethod
     def begin(
@@ -110,13 +115,13 @@ class Swarm:
         """``tell`` without its checks: costs and violations (n,) of all particles, none NaN."""
         if self._kernel is None:
             self._remember(cost, violation)
-            leader = best_index(self.own_cost, self.own_violation)
+            leader = best_index(self.own_cost, self.own_violation, self.level)
         else:
             leader = self._kernel.remember(
-                self.x, self.own, self.own_cost, self.own_violation, cost, violation
+                self.x, self.own, self.own_cost, self.own_violation, cost, violation, self.level
             )
         reached = self.own_cost[leader], self.own_violation[leader]
-        self.idle = 0 if better(*reached, *self._reached) else self.idle + 1
+        self.idle = 0 if better(*reached, *self._reached, self.level) else self.idle + 1
         self._reached = float(reached[0]), float(reached[1])
         if self.rules.topology == "gbest":
             self._leaders.fill(leader)
@@ -124,16 +129,28 @@ class Swarm:
             self._leaders[:] = self._ring_leaders()
         else:
             self._kernel.ring_leaders(
-                self.own_cost, self.own_violation, self.rules.neighbours, self._leaders
+                self.own_cost,
+                self.own_violation,
+                self.level,
+                self.rules.neighbours,
+                self._leaders,
             )
         self._move()
         self.iteration += 1
+
+    def offer(self, x: Array, found: Evaluation) -> None:
+        """A candidate (d,) found outside the swarm takes the place of the best, where it is
+        better."""
+        i = best_index(self.own_cost, self.own_violation, self.level)
+        cost, violation = float(found.cost[0]), float(found.violation[0])
+        if better(cost, violation, self.own_cost[i], self.own_violation[i], self.level):
+            self.own[i], self.own_cost[i], self.own_violation[i] = x, cost, violation
 
     @property
     def best(self) -> tuple[Array, float, float]:
         """Best candidate (d,) told so far, its cost and violation (both inf before the first
         ``tell``)."""
-        i = best_index(self.own_cost, self.own_violation)
+        i = best_index(self.own_cost, self.own_violation, self.level)
         return self.own[i].copy(), float(self.own_cost[i]), float(self.own_violation[i])
 
     @property
@@ -155,6 +172,7 @@ class Swarm:
             "rules": asdict(self.rules),
             "iteration": self.iteration,
             "idle": self.idle,
+            "level": self.level,
             "rng": self.rng.bit_generator.state,
             **{name: getattr(self, name) for name in _ARRAYS},
         }
@@ -167,6 +185,7 @@ class Swarm:
             getattr(self, name)[:] = kept[name]
         self.rng.bit_generator.state = kept["rng"]
         self.iteration, self.idle = kept["iteration"], kept["idle"]
+        self.level = kept["level"]
         self.__post_init__()
 
     def save(self, path: str | Path) -> None:
@@ -224,7 +243,7 @@ class Swarm:
         """Update own bests by Deb's rule."""
         improved = cost < self.own_cost
         if np.count_nonzero(violation) or np.count_nonzero(self.own_violation):
-            new, old = violation <= FEASIBLE, self.own_violation <= FEASIBLE
+            new, old = violation <= self.level, self.own_violation <= self.level
             less = (violation < self.own_violation) | ((violation == self.own_violation) & improved)
             improved = np.where(new & old, improved, np.where(new | old, new, less))
             self.own_violation[improved] = violation[improved]
@@ -235,13 +254,13 @@ class Swarm:
 
     def _ring_leaders(self) -> IndexArray:
         """(n,): the best own position among each particle's neighbours and itself."""
-        feasible = self.own_violation <= FEASIBLE
-        order = np.lexsort((self.own_cost, np.where(feasible, 0.0, self.own_violation)))
-        rank = np.empty(len(order), dtype=np.intp)
-        rank[order] = np.arange(len(order))
-        reach = self.rules.neighbours
-        best = np.min([np.roll(rank, k) for k in range(-reach, reach + 1)], axis=0)
-        return np.asarray(order[best])
+        rank = self.own_cost
+        if np.count_nonzero(self.own_violation > self.level):
+            broken = np.where(self.own_violation <= self.level, 0.0, self.own_violation)
+            rank = np.empty(len(broken))
+            rank[np.lexsort((self.own_cost, broken))] = np.arange(len(broken))
+        best = rank[self._ring].argmin(axis=1)
+        return np.asarray(self._ring[self._places, best])
 
     def _move(self) -> None:
         rules, x, v = self.rules, self.x, self.v

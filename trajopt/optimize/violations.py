@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.objectives.base import Evaluation
 from trajopt.optimize.base import FEASIBLE
+
+if TYPE_CHECKING:
+    from trajopt.optimize.limited import Limited
+
+_BETTER = 0.2  # [takahama2006]
+_FALLING = 0.8  # of the budget, chosen
 
 
 class Violations:
@@ -69,3 +78,22 @@ def excess(values: Array, limits: Array, allowed: Array) -> Array:
     over[over <= allowed] = 0.0
     over[np.isnan(over)] = np.inf
     return over
+
+
+@dataclass
+class Levels:
+    """Epsilon levels [takahama2006] where there are equalities: the violation up to which
+    candidates of a population count as feasible. It falls from that of the better fifth of the
+    first ones to rounding, in the first half of the budget."""
+
+    run: Limited
+    first: float = 0.0
+
+    def at(self, violation: Array) -> float:
+        """The level for candidates with these violations (n,)."""
+        limits = self.run.limits
+        if limits is None or not (limits[0] == limits[1]).any():
+            return FEASIBLE
+        self.first = self.first or float(np.quantile(violation, _BETTER))
+        done = min(1.0, self.run.used / _FALLING)
+        return max(FEASIBLE, min(self.first, 1e9) ** (1.0 - done) * FEASIBLE**done)
