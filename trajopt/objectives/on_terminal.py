@@ -34,6 +34,10 @@ class OnTerminal:
         """Compile what evaluations use, which is no part of a search."""
         self.terminal.prepare()
 
+    def impossible(self) -> str:
+        """Why no motion reaches the goal pose; empty where that is not proved."""
+        return self.terminal.impossible()
+
     def path(self, candidate: Array) -> Path:
         """The path through the control points of one candidate (d,)."""
         return self.terminal.path(candidate)

@@ -19,6 +19,7 @@ from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
 from trajopt.objectives.exact import exact_terminal
+from trajopt.objectives.reach import least_time
 from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
 from trajopt.objectives.variables import TerminalVariables
 from trajopt.problem import Problem
@@ -64,6 +65,25 @@ class TerminalObjective(TerminalVariables):
     @property
     def constrained(self) -> bool:
         return False
+
+    def impossible(self) -> str:
+        """Why no motion reaches the goal pose, with what would do; empty where that is not
+        proved."""
+        if self.actuator.is_ideal or self.kinematics is not None:
+            return ""
+        task, longest = self.problem.search, self.nominal_duration
+        if "duration_s" in self.names:
+            longest = float(self.bounds[self.names.index("duration_s"), 1])
+        speed = self.actuator.saturation
+        ends = (np.array(pose) for pose in (task.start, task.goal))
+        least = least_time(self.model.inverse, speed, *ends, longest)
+        if least <= longest:
+            return ""
+        return (
+            f"no motion reaches the goal pose in {longest:g} s: wheels of {speed:g} rad/s need "
+            f"{least:.4g} s at least, or {speed * least / longest:.4g} rad/s (actuator.duration, "
+            "actuator.saturation)"
+        )
 
     # -- cost --------------------------------------------------------------------------------------
 

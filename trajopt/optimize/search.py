@@ -154,7 +154,8 @@ def minimize(
     try:
         run = Run(asked, box, budget or Budget(), progress, callback, pool, kept)
         rng = np.random.default_rng(seed)
-        return run.finish(method.name, lambda: method.search(run, start, rng))
+        note = getattr(asked, "impossible", str)()
+        return run.finish(method.name, lambda: method.search(run, start, rng), note)
     finally:
         if pool is not None:
             pool.close()
