@@ -17,10 +17,7 @@ from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 
 Array = NDArray[np.float64]
 
-NAMES = [
-    "auto",
-    *(n for n in optimizer_names() if Capability.RESIDUALS not in optimizer_named(n).needs),
-]
+NAMES = [n for n in optimizer_names() if Capability.RESIDUALS not in optimizer_named(n).needs]
 KINDS = ("smooth", "kinked", "noisy", "constrained", "slow", "raising", "nan")
 PAUSE, SECONDS, SLACK = 0.004, 0.06, 0.05
 EVALUATIONS = 70

@@ -19,7 +19,9 @@ from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 Array = NDArray[np.float64]
 
 BOX = [[-2.0, 3.0], [-1.5, 2.5]]
-SAVING = [n for n in optimizer_names() if getattr(optimizer_named(n), "saves", False)]
+SAVING = [
+    n for n in optimizer_names() if n != "auto" and getattr(optimizer_named(n), "saves", False)
+]
 CONSTRAINED = ("slsqp", "trust-constr", "ipopt", "cobyqa")
 
 

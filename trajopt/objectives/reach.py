@@ -15,14 +15,37 @@ between its places (the turn of the smaller interval, the hull over the larger o
 from __future__ import annotations
 
 from heapq import heappop, heappush
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from trajopt.arrays import Array
 
+if TYPE_CHECKING:
+    from trajopt.objectives.terminal import TerminalObjective
+
 _STEP = np.deg2rad(0.25)  # of headings, chosen
 _ASIDE = np.linspace(-0.8, 0.8, 13)  # rad, of p from the way, chosen: any choice is a valid bound
 _SHARES = np.geomspace(0.5, 2.0, 61)  # of q, chosen likewise
+
+
+def impossible(objective: TerminalObjective) -> str:
+    """Why no motion reaches the goal pose, with what would do; empty where that is not proved."""
+    if objective.actuator.is_ideal or objective.kinematics is not None:
+        return ""
+    task, longest = objective.problem.search, objective.nominal_duration
+    if "duration_s" in objective.names:
+        longest = float(objective.bounds[objective.names.index("duration_s"), 1])
+    speed = objective.actuator.saturation
+    start, goal = np.array(task.start), np.array(task.goal)
+    least = least_time(objective.model.inverse, speed, start, goal, longest)
+    if least <= longest:
+        return ""
+    return (
+        f"no motion reaches the goal pose in {longest:g} s: wheels of {speed:g} rad/s need "
+        f"{least:.4g} s at least, or {speed * least / longest:.4g} rad/s (actuator.duration, "
+        "actuator.saturation)"
+    )
 
 
 def least_time(inverse: Array, saturation: float, start: Array, goal: Array, given: float) -> float:
@@ -43,14 +66,16 @@ def least_time(inverse: Array, saturation: float, start: Array, goal: Array, giv
     for simple in (_straight, _pieces):
         if given >= (turning + simple(inverse, way, every, low, high)) / saturation:
             return 0.0
-    return _bound(inverse, way, (low - beyond, inside, high + beyond), abs(turn)) / saturation
+    reached = low - beyond, inside, high + beyond
+    return _bound(inverse, way, reached, abs(turn)) / saturation
 
 
 def _straight(inverse: Array, way: Array, headings: Array, low: float, high: float) -> float:
     """Wheel travel, rad, of a straight way at the best heading, and of turning there and back."""
     along = np.abs(_in_body(way, headings) @ inverse[:, :2].T).max(axis=1)
     aside = np.maximum(np.maximum(low - headings, headings - high), 0.0)
-    return float((along + 2 * np.abs(inverse[:, 2]).max() * aside).min())
+    there_and_back = 2 * float(np.abs(inverse[:, 2]).max()) * aside
+    return float((along + there_and_back).min())
 
 
 def _pieces(inverse: Array, way: Array, headings: Array, low: float, high: float) -> float:
@@ -59,7 +84,7 @@ def _pieces(inverse: Array, way: Array, headings: Array, low: float, high: float
     around = np.column_stack([np.cos(angle), np.sin(angle)])
     reached = around / np.abs(around @ inverse[:, :2].T).max(axis=1)[:, None]  # by 1 rad of travel
     support = _support(around, headings[(headings >= low) & (headings <= high)], reached)
-    return float((around @ way / support).max()) / np.cos(np.pi / 180)
+    return float((around @ way / support).max() / np.cos(np.pi / 180))
 
 
 def _support(around: Array, headings: Array, reached: Array) -> Array:

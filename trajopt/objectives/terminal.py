@@ -19,7 +19,7 @@ from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
 from trajopt.objectives.exact import exact_terminal
-from trajopt.objectives.reach import least_time
+from trajopt.objectives.reach import impossible
 from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
 from trajopt.objectives.variables import TerminalVariables
 from trajopt.problem import Problem
@@ -57,33 +57,16 @@ class TerminalObjective(TerminalVariables):
 
     @property
     def provides(self) -> frozenset[Capability]:
-        always = {Capability.BATCH, Capability.RESIDUALS, Capability.SYMBOLIC}
-        return frozenset(
-            always | ({Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set())
-        )
+        some = {Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set()
+        return frozenset({Capability.BATCH, Capability.RESIDUALS, Capability.SYMBOLIC} | some)
 
     @property
     def constrained(self) -> bool:
         return False
 
     def impossible(self) -> str:
-        """Why no motion reaches the goal pose, with what would do; empty where that is not
-        proved."""
-        if self.actuator.is_ideal or self.kinematics is not None:
-            return ""
-        task, longest = self.problem.search, self.nominal_duration
-        if "duration_s" in self.names:
-            longest = float(self.bounds[self.names.index("duration_s"), 1])
-        speed = self.actuator.saturation
-        ends = (np.array(pose) for pose in (task.start, task.goal))
-        least = least_time(self.model.inverse, speed, *ends, longest)
-        if least <= longest:
-            return ""
-        return (
-            f"no motion reaches the goal pose in {longest:g} s: wheels of {speed:g} rad/s need "
-            f"{least:.4g} s at least, or {speed * least / longest:.4g} rad/s (actuator.duration, "
-            "actuator.saturation)"
-        )
+        """Why no motion reaches the goal pose, and what would do; empty where none is proved."""
+        return impossible(self)
 
     # -- cost --------------------------------------------------------------------------------------
 
@@ -99,10 +82,8 @@ class TerminalObjective(TerminalVariables):
 
     def predict_readable(self, z: Any) -> Terminal:
         """The same by ``roll_out``: what the compiled prediction is tested against."""
-        points, grid = self.control_points(z), step_grid(self.basis, self.steps)
-        return roll_out(
-            grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration
-        )
+        p, grid = self.control_points(z), step_grid(self.basis, self.steps)
+        return roll_out(grid, self.model, self.actuator, p.x, p.y, p.yaw, p.duration)
 
     def predict_exactly(self, candidate: Array) -> Terminal:
         """Final state of one candidate (d,), free of grid error."""

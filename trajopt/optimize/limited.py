@@ -27,13 +27,17 @@ class Limited(Record):
         self._most = self.budget.evaluations or _UNLIMITED
         self._until = self.budget.seconds or math.inf
         self._started = self._now()
+        self._stage = 0, self._started  # evaluations and clock where the last stage began
 
     def constructed(self) -> None:
         """Start the clock anew: what went before was loading and building, which is told apart from
         the search."""
-        if self.nfev == 0:
-            self.construct_seconds += self.elapsed
-            self._started = self._now()
+        evaluations, began = self._stage
+        if self.nfev == evaluations:
+            lost = self._now() - began
+            self.construct_seconds += lost
+            self._started += lost
+            self._stage = evaluations, self._now()
 
     def spend(self, evaluations: int) -> None:
         """Count work on the objective that does not go through ``evaluate`` (residuals), before it
@@ -52,6 +56,7 @@ class Limited(Record):
         """A part of a search that may use ``share`` of what is left of the budget; None where that
         ended it."""
         before = self._most, self._until
+        self._stage = self.nfev, self._now()
         if self._most < _UNLIMITED:
             self._most = self.nfev + max(1, int(share * self.remaining()))
         if self._until < math.inf:

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
@@ -45,6 +45,7 @@ class Run(Limited):
     callback: Callback | None = None
     pool: Pool | None = None
     state: StateFile | None = None  # where a population method saves itself
+    taken: list[str] = field(default_factory=list)  # methods that a portfolio has begun
 
     def __post_init__(self) -> None:
         Record.__post_init__(self)
@@ -207,10 +208,15 @@ class Run(Limited):
         self._loaded.enter_context(one_thread())  # of packages loaded only now
         super().constructed()
 
+    @property
+    def resumes(self) -> bool:
+        """Whether a saved search is to go on."""
+        return self.state is not None and self.state.loaded is not None
+
     def keep(self, item: Packable) -> bool:
         """The search is ``item`` from now on: it can be saved, and a saved one goes on in it, which
         is what True says."""
-        resumes = self.state is not None and self.state.loaded is not None
+        resumes = self.resumes
         if self.state is not None:
             loaded = self.state.loaded or {}
             self.state.keep(item)
@@ -246,7 +252,8 @@ class Run(Limited):
                 status = Status.FAILED
             elif not violation <= FEASIBLE:
                 status = Status.INFEASIBLE
-        text = ": ".join(part for part in (note, said, status.value) if part)
+        by = "by " + ", then ".join(self.taken) if self.taken else ""
+        text = ": ".join(part for part in (note, by, said, status.value) if part)
         bad = self.answers
         if bad.failures:
             text += f" ({bad.failures} evaluations failed; the first: {bad.first})"

@@ -22,6 +22,7 @@ from trajopt.optimize.workers import Pool
 
 # name -> module and the class or preset function that makes it with default options
 OPTIMIZERS: dict[str, tuple[str, str]] = {
+    "auto": ("trajopt.optimize.portfolio", "Auto"),
     "pso": ("trajopt.optimize.pso", "local_best"),
     "pso-gbest": ("trajopt.optimize.pso", "constriction"),
     "pso-thesis-first": ("trajopt.optimize.pso", "thesis_first"),
@@ -71,7 +72,7 @@ def optimizer_named(name: str) -> Optimizer:
         offered, wanted = installed_optimizers(), name
     if wanted not in offered:
         known = OPTIMIZERS if file == name else ()
-        raise ArgumentError("optimizer", name, "auto or one of " + ", ".join([*known, *offered]))
+        raise ArgumentError("optimizer", name, "one of " + ", ".join([*known, *offered]))
     return checked_optimizer(name, offered[wanted]())
 
 
@@ -138,7 +139,7 @@ def minimize(
         if not (function is None or callable(function)):
             raise ArgumentError(name, function, "a function, or None")
     if isinstance(optimizer, str):
-        method = automatic(asked) if optimizer == "auto" else optimizer_named(optimizer)
+        method = optimizer_named(optimizer)
     else:
         method = checked_optimizer(repr(optimizer), optimizer)
     refuse_unfit(method, asked)
@@ -171,10 +172,3 @@ def refuse_unfit(method: Optimizer, objective: Objective) -> None:
     if objective.constrained and getattr(method, "only_bounds", False):
         expected = "a method that handles constraints: pso, cma-es, slsqp, trust-constr or cobyqa"
         raise ArgumentError("optimizer", method.name, expected)
-
-
-def automatic(objective: Objective) -> Optimizer:
-    """The optimizer that suits an objective best."""
-    if hasattr(objective, "affine_part"):
-        return optimizer_named("lattice")
-    return optimizer_named("pso")

@@ -96,4 +96,4 @@ class Levels:
             return FEASIBLE
         self.first = self.first or float(np.quantile(violation, _BETTER))
         done = min(1.0, self.run.used / _FALLING)
-        return max(FEASIBLE, min(self.first, 1e9) ** (1.0 - done) * FEASIBLE**done)
+        return float(max(FEASIBLE, min(self.first, 1e9) ** (1.0 - done) * FEASIBLE**done))

@@ -1,5 +1,4 @@
-"""Jerk-limited motions: the time-optimal profile, smoothed in the time domain by a nonlinear
-program.
+"""Jerk-limited motions: the time-optimal profile, smoothed in time by a nonlinear program.
 
 Path parameter s, speed v and acceleration a are states at N + 1 times, jerk is constant between
 them, the duration is free. The limits' rows hold at every node; rows that no motion of this kind
@@ -37,14 +36,12 @@ _FINE = 10  # checked points a node interval
 _WANTED_SLOWDOWN = 1.01  # of time; chosen: beyond it intervals are split
 _MOST_SLOWDOWN = 1.05  # of time; chosen: beyond it the result is refused
 # Tables as the rows are, then the strictest rows around a place, and programs solved with each at
-# most; chosen: the first are closer where rows are smooth, the second hold where they jump (edges
-# of ramps).
+# most; chosen: the first are closer where rows are smooth, the second hold where they jump (ramps).
 _ATTEMPTS = ((False, 2), (True, 3))
 _PARTS = 3  # an interval is split into; chosen
 _SPLIT_ABOVE = 1e-3  # relative violation that splits an interval, or puts a row in; chosen
 _NEAR = 0.4  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
-# Share by which rows are tightened at the nodes, for what happens between them; chosen.
-_TIGHTER = 1e-3
+_TIGHTER = 1e-3  # share by which rows are tightened at the nodes, for what is between; chosen
 
 
 @dataclass(frozen=True, eq=False)
