@@ -24,6 +24,7 @@ console = PlainConsole(
 )  # tables keep their shape when piped
 
 FAULTY = 1
+INTERRUPTED = 130  # as shells say it of Ctrl-C
 # What can be switched on in a physics check; None drives the planned wheel speeds.
 CONTROLS: dict[str, Mode | None] = {
     "none": None,

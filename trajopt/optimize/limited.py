@@ -11,6 +11,7 @@ from typing import NoReturn
 import numpy as np
 
 from trajopt.optimize.base import FEASIBLE, Budget, StageOver, Status, Stop
+from trajopt.optimize.process import interrupted
 from trajopt.optimize.record import Record
 
 _UNLIMITED = 2**62
@@ -103,6 +104,8 @@ class Limited(Record):
     def _look(self, before: int = 0) -> None:
         """End the search where the target is met or the time is up; ``before`` evaluations are to
         come."""
+        if interrupted():
+            self.stop(Status.INTERRUPTED)
         target = self.budget.target
         # A known optimum is met to rounding.
         rounding = 8 * np.finfo(float).eps * abs(target or 0.0)

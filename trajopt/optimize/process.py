@@ -52,15 +52,39 @@ def _switch(
         return None
 
 
+_interrupts: list[int] = []  # signals since the search began that raised KeyboardInterrupt
+
+
+def interrupted() -> bool:
+    """Whether Ctrl-C or SIGTERM has come, though compiled code may have swallowed what it raised
+    (CasADi does)."""
+    return bool(_interrupts)
+
+
 @contextmanager
 def terminable() -> Iterator[None]:
     """SIGTERM ends a search as Ctrl-C does, unless the program has a use of its own for it."""
-    mine = threading.current_thread() is threading.main_thread()
-    if not mine or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+    if threading.current_thread() is not threading.main_thread():
         yield
         return
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _interrupts.clear()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def noted(number: int, frame: Any) -> None:
+        own = before[signal.Signals(number)]
+        try:
+            (own if callable(own) else signal.default_int_handler)(number, frame)
+        except KeyboardInterrupt:
+            _interrupts.append(number)
+            raise
+
+    for number, own in before.items():
+        if callable(own) or own is signal.SIG_DFL:
+            signal.signal(number, noted)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        _interrupts.clear()
+        for number, own in before.items():
+            if callable(own) or own is signal.SIG_DFL:
+                signal.signal(number, own)
