@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-slurm check format lines schema pictures clean
+.PHONY: help demo test test-all test-slurm check format lines docs schema sheet pictures clean
 
 help:  ## what the targets do
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /  -  /'
@@ -14,7 +14,7 @@ $(READY): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV): a few minutes on a fresh machine."
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[simulate,speed,sweep,optimizers,video,dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[simulate,speed,sweep,optimizers,video,docs,dev]'
 	touch $@
 
 demo: $(READY)  ## solve Table 5.3 and Scenario 1 forward35 (P1 and P2 free: it keeps clear of the step), check both in pybullet, write out/demo/
@@ -45,10 +45,16 @@ format: $(READY)  ## rewrite all Python files in the project's form
 lines: $(READY)  ## lines of code of trajopt/, without blanks, comments, docstrings
 	$(BIN)/python tests/code_lines.py trajopt
 
+docs: $(READY)  ## the documentation as a site, out/docs/index.html
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/docs
+
 schema: $(READY)  ## rewrite the JSON schemas of problem, robot and sweep files
 	$(BIN)/trajopt schema problem --out problems/problem.schema.json
 	$(BIN)/trajopt schema robot --out trajopt/robots/robot.schema.json
 	$(BIN)/trajopt schema sweep --out problems/sweeps/sweep.schema.json
+
+sheet: $(READY)  ## every figure on one sheet, out/contact_sheet.png, to be looked at
+	$(BIN)/python -m benchmarks.contact_sheet
 
 pictures: $(READY)  ## rewrite the pictures of README.md (the climb study's: after its sweep, see benchmarks/readme_pictures.py)
 	$(BIN)/python -m benchmarks.readme_pictures

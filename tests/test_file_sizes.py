@@ -17,6 +17,7 @@ LONGER = {
     "trajopt/cli/sweep.py": "one command and its subcommands, which share options and messages",
     "trajopt/optimize/swarm.py": "one compiled kernel and its readable twin, side by side",
     "trajopt/robots/robot.py": "a robot, and all that follows from its file alone",
+    "trajopt/refine/jerk.py": "one program, from its guesses to the checked motion",
     "trajopt/simulate/pybullet.py": "the one file that calls pybullet to build and step",
     "trajopt/timing/scaling.py": "time_scale and its steps, from arguments to trajectory",
     "trajopt/report/run_folder.py": "writing and reading a run folder, kept in step",

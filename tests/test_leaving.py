@@ -20,7 +20,8 @@ from tests.sweeps.crashes import ROOT, cases, descendants
 from tests.sweeps.run_functions import Case, cheap
 from trajopt.cli import app
 from trajopt.errors import ProblemError, TrajoptError, printable
-from trajopt.report.words import PlainConsole, words
+from trajopt.report.console import PlainConsole
+from trajopt.report.words import words
 from trajopt.sweeps.store import StoreError, open_store
 from trajopt.sweeps.sweeps import sweep
 

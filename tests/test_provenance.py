@@ -14,7 +14,7 @@ import pytest
 from trajopt import provenance
 
 ROOT = Path(provenance.__file__).parents[1]
-OURS = '[project]\nname = "trajopt"\n'
+OURS = '[project]\nname = "wheeled-trajopt"\n'
 THEIRS = '[project]\nname = "stranger"\n'
 
 

@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     from trajopt.solution import Solution
     from trajopt.sweeps.sweeps import sweep
     from trajopt.timing.scaling import time_scale
-    from trajopt.timing.trajectory import State, Trajectory
+    from trajopt.timing.states import State
+    from trajopt.timing.trajectory import Trajectory
     from trajopt.world.terrain import Flat
 
 __version__ = "0.1.0"
@@ -62,7 +63,7 @@ _HOME = {
     "Solution": "trajopt.solution",
     "Speed": "trajopt.limits.speed",
     "SpeedZones": "trajopt.limits.speed_bound",
-    "State": "trajopt.timing.trajectory",
+    "State": "trajopt.timing.states",
     "Status": "trajopt.optimize.base",
     "Tip": "trajopt.limits.tip",
     "Trajectory": "trajopt.timing.trajectory",

@@ -72,10 +72,10 @@ class MissingDependencyError(TrajoptError, ImportError):
         self.package, self.extra, self.purpose = package, extra, purpose
         super().__init__(
             f"{purpose} needs the package '{package}', which is not installed: "
-            f"pip install 'trajopt[{extra}]' (pybullet has wheels up to CPython 3.11)"
+            f"pip install 'wheeled-trajopt[{extra}]' (pybullet has wheels up to CPython 3.11)"
             if package == "pybullet"
             else f"{purpose} needs the package '{package}', which is not installed: "
-            f"pip install 'trajopt[{extra}]'"
+            f"pip install 'wheeled-trajopt[{extra}]'"
         )
 
 

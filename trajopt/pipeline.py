@@ -6,11 +6,10 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult
@@ -19,15 +18,15 @@ from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
 from trajopt.problem import Problem
 from trajopt.problem.extensions import SECTIONS, entry
-from trajopt.refine.profile import follow
-from trajopt.simulate.check import ValidationReport
-from trajopt.simulate.check import validate as check
-from trajopt.simulate.engine import Engine
 from trajopt.solution import Solution, search_objective
-from trajopt.timing.nominal import nominal_timing
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.scene import Scene
+
+if TYPE_CHECKING:
+    from trajopt.control.approach import Mode
+    from trajopt.simulate.check import ValidationReport
+    from trajopt.simulate.engine import Engine
 
 # Where no wheel angle counts, every candidate is timed: 5 to 30 ms each. Chosen: within 0.1 % of
 # longer searches on a scenario's space.
@@ -63,18 +62,15 @@ def solve(
         )
     job = problem.job.name
     if job in SECTIONS:
-        unused = {"x0": x0, "callback": callback, "state": state}
-        for name, value in {**unused, "engine": None if engine == "auto" else engine}.items():
-            if value is not None:
-                raise ArgumentError(name, value, f"left out for the job '{job}'")
+        asked = None if engine == "auto" else engine
+        expected = f"left out for the job '{job}'"
+        _refuse(expected, x0=x0, callback=callback, state=state, engine=asked)
         found: Solution = entry(job).solve(
             problem, optimizer=optimizer, seed=seed, budget=budget, progress=progress
         )
     elif job == "path":
-        unused = {"optimizer": None if optimizer == "auto" else optimizer, "budget": budget}
-        for name, value in {**unused, "x0": x0, "callback": callback, "state": state}.items():
-            if value is not None:
-                raise ArgumentError(name, value, "left out: a given path is not searched")
+        by, expected = None if optimizer == "auto" else optimizer, "left out: a path is given"
+        _refuse(expected, optimizer=by, budget=budget, x0=x0, callback=callback, state=state)
         found = _timed(problem, problem.flat_path, engine)
     else:
         objective = search_objective(problem)
@@ -93,6 +89,12 @@ def solve(
         )
         found = _timed(problem, objective.path(searched.x), engine, searched)
     return replace(with_details(found), wall_time=time.perf_counter() - started)
+
+
+def _refuse(expected: str, **given: Any) -> None:
+    for name, value in given.items():
+        if value is not None:
+            raise ArgumentError(name, value, expected)
 
 
 def with_details(solution: Solution) -> Solution:
@@ -119,12 +121,16 @@ def _timed(
         if problem.actuator is not None and searched is not None:
             if engine != "auto":
                 raise ArgumentError("engine", engine, "auto with [actuator]: nothing is scaled")
+            from trajopt.timing.nominal import nominal_timing
+
             terminal = terminal_objective(problem)
             duration = float(terminal.control_points(searched.x[:, None]).duration[0, 0])
             timed = nominal_timing(path, duration, limits, **around)
         elif problem.profile is not None:
             if engine != "auto":
                 raise ArgumentError("engine", engine, "auto with [profile]")
+            from trajopt.refine.profile import follow
+
             bound, manner = problem.profile.bound, problem.profile.manner
             timed = follow(path, bound, limits, manner=manner, **around).trajectory
         else:
@@ -155,6 +161,8 @@ def validate(
     ArgumentError for what cannot be driven there, MissingDependencyError where the engine is not
     installed and SimulationError where the simulation leaves physics.
     """
+    from trajopt.simulate.check import validate as check
+
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError(
             "trajectory", type(trajectory).__name__, "a Trajectory (solution.trajectory has one)"

@@ -45,7 +45,7 @@ def commit() -> str | None:
 
     None where the package is installed without its repository, also inside a checkout of something
     else: a repository counts only if its root holds this very package and the pyproject.toml named
-    trajopt, and if git keeps the package's files.
+    wheeled-trajopt, and if git keeps the package's files.
     """
     package = Path(trajopt.__file__).resolve().parent
     root = package.parent
@@ -85,7 +85,7 @@ def _is_project(file: Path) -> bool:
         described = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):  # absent, or no TOML
         return False
-    return bool(described.get("project", {}).get("name") == "trajopt")
+    return bool(described.get("project", {}).get("name") == "wheeled-trajopt")
 
 
 def _git(folder: Path, *arguments: str) -> str | None:

@@ -39,8 +39,8 @@ class Details(Protocol):
         """Facts for the summary, units in their names."""
         ...
 
-    def save(self, folder: FilePath, *, pictures: bool) -> None:
-        """Write files of its own into a run folder."""
+    def save(self, folder: FilePath, *, pictures: str | None) -> None:
+        """Write files of its own into a run folder, ``pictures`` in this format."""
         ...
 
 

@@ -27,7 +27,7 @@ from benchmarks.peers.time_scaling_cases import (
     force_stages,
     robot,
 )
-from benchmarks.peers.timing_picture import draw_growth, growth_exponent
+from benchmarks.peers.timing_picture import growth_exponent, growth_figure
 from trajopt.arrays import Array
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
@@ -36,6 +36,7 @@ from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.samples import sample_at
+from trajopt.report.style import in_style, save_figure
 from trajopt.timing.bounds import bounds_profile
 from trajopt.timing.compiled import compiled_profile, fastest_profiles
 from trajopt.timing.scaling import time_scale
@@ -264,10 +265,11 @@ def growth(quick: bool) -> tuple[ResultTable, str]:
             ]
         )
     FIGURES.mkdir(parents=True, exist_ok=True)
-    picture = draw_growth(
-        {"compiled": (sizes, ours), "toppra": (sizes[: len(theirs)], theirs)},
-        FIGURES / "growth.png",
-    )
+    with in_style():
+        growth = growth_figure(
+            {"compiled": (sizes, ours), "toppra": (sizes[: len(theirs)], theirs)}
+        )
+        picture = save_figure(growth, FIGURES / "growth.png")
     note = (
         f"Cost against N from {sizes[0]} to {sizes[-1]} points: compiled ~ N^{growth_exponent(sizes, ours):.3f}, "
         f"toppra ~ N^{growth_exponent(sizes[: len(theirs)], theirs):.3f} (least squares in log-log; 1 is linear). "

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path as FilePath
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
 from trajopt.report.style import (
@@ -13,10 +13,8 @@ from trajopt.report.style import (
     GREY,
     ORANGE,
     VERMILION,
-    in_style,
     legend_beside,
     new_figure,
-    save_figure,
 )
 
 _COLOURS = (BLUE, VERMILION, ORANGE)
@@ -37,42 +35,38 @@ def growth_exponent(points: Sequence[float], seconds: Sequence[float]) -> float:
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
 
 
-def draw_growth(
-    series: Mapping[str, tuple[Sequence[float], Sequence[float]]], file: str | FilePath
-) -> FilePath:
+def growth_figure(series: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> Figure:
     """Seconds over gridpoints, both logarithmic; ``series`` maps a name to (points, seconds).
-    Returns ``file``.
 
     Each is labelled with its exponent; the dashed line through the first series' last point is cost
     proportional to the number of points.
     """
-    with in_style():
-        figure = new_figure(3.8)
-        axes = figure.add_subplot()
-        for (name, (points, seconds)), colour in zip(series.items(), _COLOURS, strict=False):
-            exponent = growth_exponent(points, seconds)
-            axes.loglog(
-                points,
-                1e3 * np.asarray(seconds),
-                "o-",
-                ms=4,
-                color=colour,
-                label=f"{name}: cost ~ N^{exponent:.2f}",
-            )
-        points, seconds = next(iter(series.values()))
+    figure = new_figure(3.8)
+    axes = figure.add_subplot()
+    for (name, (points, seconds)), colour in zip(series.items(), _COLOURS, strict=False):
+        exponent = growth_exponent(points, seconds)
         axes.loglog(
             points,
-            1e3 * seconds[-1] / points[-1] * np.asarray(points),
-            "--",
-            color=GREY,
-            lw=0.9,
-            zorder=1,
-            label="proportional to N",
+            1e3 * np.asarray(seconds),
+            "o-",
+            ms=4,
+            color=colour,
+            label=f"{name}: cost ~ N^{exponent:.2f}",
         )
-        axes.set(
-            xlabel="gridpoints N",
-            ylabel="time, ms",
-            title="Cost of time scaling against the gridpoints",
-        )
-        legend_beside(axes)
-        return save_figure(figure, FilePath(file))
+    points, seconds = next(iter(series.values()))
+    axes.loglog(
+        points,
+        1e3 * seconds[-1] / points[-1] * np.asarray(points),
+        "--",
+        color=GREY,
+        lw=0.9,
+        zorder=1,
+        label="proportional to N",
+    )
+    axes.set(
+        xlabel="gridpoints N (–)",
+        ylabel="time (ms)",
+        title="Cost of time scaling against the gridpoints",
+    )
+    legend_beside(axes)
+    return figure

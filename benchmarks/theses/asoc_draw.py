@@ -48,7 +48,10 @@ def draw_isotropy(effort: Effort) -> None:
     curve = np.array([mean(spread_modules(3), float(r), few) for r in ratios])
     save_figure(
         curve_figure(
-            ratios, curve, FIGURE_9, ("Figure 9: three ASOCs", "split / offset", "mean isotropy")
+            ratios,
+            curve,
+            FIGURE_9,
+            ("Figure 9: three ASOCs", "split / offset (–)", "mean isotropy (–)"),
         ),
         FIGURES / "figure_09.png",
     )
@@ -56,7 +59,10 @@ def draw_isotropy(effort: Effort) -> None:
     curve = np.array([mean(ring(a, 2 * a), 2.0, few) for a in angles])
     save_figure(
         curve_figure(
-            angles, curve, FIGURE_11, ("Figure 11: modules at 0, a, 2a", "a, deg", "mean isotropy")
+            angles,
+            curve,
+            FIGURE_11,
+            ("Figure 11: modules at 0, a, 2a", "a (deg)", "mean isotropy (–)"),
         ),
         FIGURES / "figure_11.png",
     )
@@ -65,7 +71,7 @@ def draw_isotropy(effort: Effort) -> None:
     values = np.array([mean(spread_modules(4), float(r), replace(few, points=64)) for r in table])
     area = np.interp(split[None, :] / offset[:, None], table, values)
     save_figure(
-        map_figure(split, offset, area, ("Figure 8: four ASOCs", "split, m", "offset, m")),
+        map_figure(split, offset, area, ("Figure 8: four ASOCs", "split (m)", "offset (m)")),
         FIGURES / "figure_08.png",
     )
     ratios, degrees = np.linspace(1.5, 3.2, 35), np.linspace(0, 45, 16)
@@ -90,7 +96,7 @@ def draw_isotropy(effort: Effort) -> None:
             ratios,
             degrees,
             area,
-            ("Figure 13: tilts -max, 0, +max", "split / offset", "largest tilt, deg"),
+            ("Figure 13: tilts -max, 0, +max", "split / offset (–)", "largest tilt (deg)"),
             ridge,
         ),
         FIGURES / "figure_13.png",

@@ -59,7 +59,7 @@ def map_figure(
     figure = new_figure(3.8, 5.4)
     axes = figure.add_subplot()
     lines = axes.contourf(x, y, values, levels=np.linspace(0, 1, 21), cmap="viridis")
-    figure.colorbar(lines, ax=axes, label="mean isotropy", ticks=np.linspace(0, 1, 6))
+    figure.colorbar(lines, ax=axes, label="mean isotropy (–)", ticks=np.linspace(0, 1, 6))
     if ridge is not None:
         axes.plot(*ridge, color="white", linestyle="--", label="2 / cos(tilt)")
         axes.legend(labelcolor="white")
@@ -86,8 +86,8 @@ def tracks_figure(corners: Array, tracks: Sequence[tuple[str, Array]], title: st
             track[:, 0], track[:, 1], color=style[0], linestyle=style[1], linewidth=1.2, label=label
         )
     axes.set_title(title)
-    axes.set_xlabel("x, m")
-    axes.set_ylabel("y, m")
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
     figure.legend(loc="outside right upper")
     return figure
 
@@ -106,8 +106,8 @@ def speed_figure(
         0.48 * commanded, color=GREY, linestyle=":", linewidth=0.8, label="48 %, thesis's least"
     )
     axes.set_title(title)
-    axes.set_xlabel("time, s")
-    axes.set_ylabel("speed, m/s")
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("speed (m/s)")
     axes.set_ylim(bottom=0)
     figure.legend(loc="outside right upper")
     return figure
@@ -125,9 +125,9 @@ def front_figure(terms: Array, names: Sequence[str], best: Array) -> Figure:
         star = axes.plot(best[axis], best[k], "*", color=VERMILION, markersize=9, clip_on=False)
         axes.set_ylim(0, 1.05)
         axes.set_title(names[k])
-        axes.set_xlabel("d_max / best")
+        axes.set_xlabel("d_max / best (–)")
         if place == 0:
-            axes.set_ylabel("share of best")
+            axes.set_ylabel("share of best (–)")
             figure.legend(
                 [*front, *star],
                 ["Pareto front", "optimum of J"],

@@ -57,9 +57,9 @@ SCENARIO = {0.035: 2, 0.05: 1}
 PSO_SEARCHES = 5  # of the thesis's PSO, each serving an equal share of the trials
 TORQUES, FRICTIONS = (2.0, 4.0, 8.0), (0.5, 0.8)
 CAUSES = {
-    "heading error at the end, deg": (0.0, 2.0, 5.0, 10.0),
-    "gap, cm": (2.0, 5.0, 10.0, 20.0),
-    "approach speed, rad/s": (2.0, 4.0, 8.5, 15.0),
+    "heading error at the end (deg)": (0.0, 2.0, 5.0, 10.0),
+    "gap (cm)": (2.0, 5.0, 10.0, 20.0),
+    "approach speed (rad/s)": (2.0, 4.0, 8.5, 15.0),
 }
 SOURCES = ("exact", "thesis PSO", "uniform")
 PACKAGES = ("numpy", "mujoco", "pybullet")
@@ -239,10 +239,10 @@ def causes(engine: str, trials: int, workers: int) -> Iterator[list[Trial]]:
 def _caused(
     problem: Problem, configuration: Configuration, cause: str, value: float, number: int
 ) -> Climb:
-    if cause == "gap, cm":
+    if cause == "gap (cm)":
         problem = problem.replace({"climb.gap": value / 100})
-    turned = math.radians(value) if cause == "heading error at the end, deg" else 0.0
-    speed = value if cause == "approach speed, rad/s" else CLIMB_SPEED
+    turned = math.radians(value) if cause == "heading error at the end (deg)" else 0.0
+    speed = value if cause == "approach speed (rad/s)" else CLIMB_SPEED
     target, rng = approach_target(problem, configuration), np.random.default_rng([number, 101])
     errors = rng.normal([0.0, 0.0, turned], [POSITION_SD, POSITION_SD, YAW_SD])
     pose = np.array(target.pose) + errors

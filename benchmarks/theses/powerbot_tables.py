@@ -224,10 +224,15 @@ def safe_speeds() -> ResultTable:
 
 def draw_plans() -> list[str]:
     """Pictures of the plans and of the safe speed; their names."""
-    from benchmarks.theses.powerbot_figures import draw_path, draw_profiles, draw_safe_speed
+    from benchmarks.theses.powerbot_figures import (
+        path_speed_figure,
+        safe_speed_figure,
+        speeds_figure,
+    )
+    from trajopt.report.style import in_style, save_figure
 
     FIGURES.mkdir(parents=True, exist_ok=True)
-    made = []
+    made = {}
     for number in TIMED:
         task = problem(number)
         plans = [
@@ -235,20 +240,14 @@ def draw_plans() -> list[str]:
             ("optimal, thesis's limits", timed(task, "thesis")),
             ("optimal, physical limits", timed(task, "physical")),
         ]
-        made += [
-            draw_path(
-                plans[2][1], FIGURES / f"path_{number}.png", knots=task.flat_path.points.tolist()
-            ),
-            draw_profiles(plans, FIGURES / f"profiles_{number}.png"),
-        ]
-    made.append(
-        draw_safe_speed(
-            FIGURES / "safe_speed.png",
-            braking=slip_range(math.radians(-5.99))[1],
-            robot_speed=LARGEST_SPEED,
-        )
-    )
-    return [file.name for file in made]
+        with in_style():
+            knots = task.flat_path.points.tolist()
+            made[f"path_{number}.png"] = path_speed_figure(plans[2][1], knots=knots)
+            made[f"profiles_{number}.png"] = speeds_figure(plans)
+    with in_style():
+        braking = slip_range(math.radians(-5.99))[1]
+        made["safe_speed.png"] = safe_speed_figure(braking=braking, robot_speed=LARGEST_SPEED)
+        return [save_figure(figure, FIGURES / name).name for name, figure in made.items()]
 
 
 NOTES = (

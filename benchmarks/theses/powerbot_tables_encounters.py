@@ -117,8 +117,9 @@ def visits(task: Problem) -> dict[str, tuple[Sensor, list[Visitor]]]:
 def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
     """Experiment 3 in pybullet, closed loop, its obstacles as solid discs; names of the
     pictures."""
+    from trajopt.report.style import in_style, save_figure
     from trajopt.systems.powerbot.drive_encounter import drive_encounter
-    from trajopt.systems.powerbot.pictures import draw_replan
+    from trajopt.systems.powerbot.pictures import replan_figure
 
     FIGURES.mkdir(parents=True, exist_ok=True)
     task, robot = problem(3), BALANCED
@@ -157,9 +158,9 @@ def encounter_three_in_physics() -> tuple[ResultTable, list[str]]:
                 f"{slowest(run):.1f}",
             ]
         )
-        pictures.append(
-            draw_replan(run, where, FIGURES / f"experiment_3_{len(rows)}.png", free=free).name
-        )
+        with in_style():
+            file = FIGURES / f"experiment_3_{len(rows)}.png"
+            pictures.append(save_figure(replan_figure(run, where, free=free), file).name)
     return ResultTable(
         f"Experiment 3 in physics, closed loop, {1e3 * START_ERROR[1]:.0f} mm and {math.degrees(START_ERROR[2]):.0f} "
         "deg off at the start",

@@ -73,10 +73,10 @@ def rate_maps(frame: pd.DataFrame) -> Figure:
         axes.set_yticks(range(len(heights)), [f"{100 * v:g}" for v in heights])
         axes.grid(visible=False)
         axes.set_title(name)
-        axes.set_xlabel("friction")
+        axes.set_xlabel("friction (–)")
     panels[0].set_ylabel("step height (cm)")
     figure.colorbar(
-        image, ax=list(panels), label="climb rate", format=lambda v, _: f"{100 * v:.0f} %"
+        image, ax=list(panels), label="climb rate (%)", format=lambda v, _: f"{100 * v:.0f}"
     )
     each = len(rows) / max(
         1, len(rows.groupby(["configuration", "obstacles.step.height", "friction"]))
@@ -109,9 +109,9 @@ def rate_lines(frame: pd.DataFrame) -> Figure:
         )
         _line(right, here["torque"].to_numpy(dtype=float), here["climbed"], colour, name)
     left.set_xlabel("heading error (deg)")
-    left.set_ylabel("climb rate")
+    left.set_ylabel("climb rate (%)")
     left.set_ylim(0.0, 1.02)
-    left.yaxis.set_major_formatter(lambda v, _: f"{100 * v:.0f} %")
+    left.yaxis.set_major_formatter(lambda v, _: f"{100 * v:.0f}")
     right.set_xlabel("wheel torque (N m)")
     right.set_xscale("log", base=2)
     torques = sorted(set(rows["torque"]))

@@ -20,31 +20,40 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from trajopt.arrays import Array
-from trajopt.report.style import BLACK, BLUE, GREY, ORANGE, VERMILION, new_figure
+from trajopt.report.convergence_picture import draw_band
+from trajopt.report.style import (
+    BLACK,
+    BLUE,
+    GREY,
+    LINE_COLOURS,
+    MOST_LINES,
+    VERMILION,
+    new_figure,
+)
 
 Box = tuple[tuple[float, float], tuple[float, float]]  # x and y range, m
 
 _WIDE = 8.4  # inch
+_DISTINCT = 4  # up to which lines get colours without an order, chosen
 _LEAST = 1e-16  # smallest cost drawn: rounding of doubles
-_MOST_LINES = 4  # up to which lines get colours that tell them apart, chosen
-_DISTINCT = (BLUE, VERMILION, ORANGE, GREY)
 
 
 def searches_figure(
     groups: Sequence[tuple[str, Sequence[tuple[str, Array]]]], goal: Array
 ) -> Figure:
     """Paths (N, 2), m, that searches found: a panel a group, a labelled line a search (Figures
-    5.23-5.25)."""
+    5.23-5.25); of more than 8 as many, evenly out of all."""
     columns = 2
     rows = math.ceil(len(groups) / columns)
     figure = new_figure(2.9 * rows + 0.2, _WIDE)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
     for ax, (title, lines) in zip(grid, groups, strict=False):
-        for k, (label, path) in enumerate(lines):
+        chosen = np.linspace(0, len(lines) - 1, min(len(lines), MOST_LINES)).round().astype(int)
+        for k, (label, path) in enumerate(lines[i] for i in chosen):
             colour = (
-                _DISTINCT[k]
-                if len(lines) <= _MOST_LINES
-                else colormaps["viridis"](0.95 * k / (len(lines) - 1))
+                LINE_COLOURS[k]
+                if len(chosen) <= _DISTINCT
+                else colormaps["viridis"](0.95 * k / (len(chosen) - 1))
             )
             ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.1, label=label)
         ax.plot(*goal, "x", color=BLACK)
@@ -121,26 +130,25 @@ def _box(ax: Axes, box: Box) -> None:
 
 
 def costs_figure(panels: Sequence[tuple[str, Sequence[tuple[Array, Array]]]]) -> Figure:
-    """Best cost over iterations of several searches: panels of (iterations, cost) lines."""
+    """Best cost over iterations: panels of (iterations, cost) of several seeds, drawn as their median and a band."""
     figure = new_figure(2.4 * math.ceil(len(panels) / 3) + 0.2, _WIDE)
     grid = figure.subplots(
         math.ceil(len(panels) / 3), 3, squeeze=False, sharex=True, sharey=True
     ).ravel()
     for ax, (title, lines) in zip(grid, panels, strict=False):
-        for iterations, cost in lines:  # the best so far holds until it is beaten
-            ax.step(
-                iterations,
-                np.maximum(cost, _LEAST),
-                where="post",
-                color=BLUE,
-                linewidth=0.8,
-                alpha=0.7,
-            )
+        counts = np.unique(np.concatenate([iterations for iterations, _ in lines]))
+        best = np.column_stack(
+            [
+                np.where(counts < iterations[0], np.inf, cost[np.searchsorted(iterations, counts, side="right") - 1])
+                for iterations, cost in lines  # the best so far holds until it is beaten
+            ]
+        )  # fmt: skip
+        draw_band(ax, counts, np.maximum(best, _LEAST), BLUE)
         ax.set(title=title, yscale="log")
     for ax in grid[::3]:
-        ax.set_ylabel("best cost")
+        ax.set_ylabel("best cost (–)")
     for ax in grid[max(0, len(panels) - 3) : len(panels)]:
-        ax.set_xlabel("iteration")
+        ax.set_xlabel("iteration (–)")
         ax.xaxis.set_tick_params(labelbottom=True)
     for ax in grid[len(panels) :]:
         ax.set_axis_off()
@@ -186,12 +194,10 @@ def cost_maps_figure(maps: Sequence[CostMap], columns: int = 3) -> Figure:
             markersize=4.5,
             markeredgewidth=0.6,
         )
-        ax.set(title=shown.title, aspect="equal", xlabel="P2: x (m)")
+        ax.set(title=shown.title, aspect="equal", xlabel="P2: x (m)", ylabel="P2: y (m)")
         ax.grid(visible=False)
-    for ax in grid[::columns]:
-        ax.set_ylabel("P2: y (m)")
     for ax in grid[len(maps) :]:
         ax.set_axis_off()
     if drawn is not None:
-        figure.colorbar(drawn, ax=grid.tolist(), label="cost", shrink=0.7)
+        figure.colorbar(drawn, ax=grid.tolist(), label="cost (–)", shrink=0.7)
     return figure

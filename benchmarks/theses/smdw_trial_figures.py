@@ -74,7 +74,7 @@ def climb_rates_figure(cells: Sequence[ClimbCell]) -> Figure:
             here = [c for c in cells if (c.engine, c.height) == (engine, height)]
             _draw_rates(ax, here, sources)
             ax.set_title(f"{engine}, step of {100 * height:g} cm")
-        row[0].set_ylabel("leading wheels up, share")
+        row[0].set_ylabel("leading wheels up, share (–)")
     handles = [
         Line2D([], [], color=_SOURCE_COLOURS[i % 4], linewidth=6, label=s)
         for i, s in enumerate(sources)
@@ -167,7 +167,7 @@ def phase_map_figure(
         figure.colorbar(
             drawn,
             ax=grid.ravel().tolist(),
-            label="critical wheels up, share of the runs",
+            label="critical wheels up, share of the runs (–)",
             shrink=0.6,
         )
     return figure
@@ -196,7 +196,7 @@ def causes_figure(causes: Mapping[str, Mapping[str, Mapping[float, tuple[int, in
             )
             ax.set_xticks(range(len(cells)), [f"{value:g}" for value in cells])
         ax.set_xlabel(cause)
-    axes[0].set(ylabel="critical wheels up, share", ylim=(-0.03, 1.03))
+    axes[0].set(ylabel="critical wheels up, share (–)", ylim=(-0.03, 1.03))
     figure.legend(
         *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False
     )

@@ -8,7 +8,7 @@ import pytest
 
 from trajopt import Path, Speed, robot, time_scale
 from trajopt.limits.acceleration import Acceleration
-from trajopt.report.motion import posture, trajectory_table
+from trajopt.report.motion import MOST_ROWS, posture, sampled, table_times, trajectory_table
 from trajopt.world.plane import Plane
 
 LIMITS = [Speed(1.0), Acceleration(1.0, 1.0)]
@@ -58,3 +58,20 @@ def test_castors_and_steered_wheels_have_their_columns() -> None:
                 turned = np.trapezoid(table[f"wheel_{wheel}_{rate}"], table["t_s"])
                 ends = table[f"wheel_{wheel}_{angle}"].iloc[[0, -1]].to_numpy()
                 assert ends[1] - ends[0] == pytest.approx(turned, abs=2e-3), (wheel, angle)
+
+
+def test_slow_motions_have_rows_by_the_cells_of_the_profile() -> None:
+    """As many as 20,000 and no step of 10 ms; all gridpoints are among them, and the exact motion."""
+    path = Path.through([(0.0, 0.0), (2.0, 0.3), (4.0, 0.0)])
+    timed = time_scale(path, [Speed(1.0), Acceleration(1e-6, 1e-6)], robot=robot("loc8"))
+    assert timed.duration > 3000
+    times = table_times(timed)
+    assert times[0] == 0
+    assert times[-1] == timed.duration
+    assert np.all(np.diff(times) > 0)
+    assert 10_000 < len(times) <= MOST_ROWS + 1
+    assert np.isin(timed.times, times).all()
+    table = pd.DataFrame(trajectory_table(timed))
+    np.testing.assert_allclose(table["x_m"], timed.at(times).pose[:, 0], atol=0)
+    assert f"{len(times)} rows" in sampled(timed)
+    assert "equal steps" in sampled(time_scale(path, LIMITS, robot=robot("loc8")))

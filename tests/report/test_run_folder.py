@@ -344,7 +344,7 @@ def test_damaged_folders_are_refused_in_words(damage: str, exact: Solution, tmp_
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda t: t[: len(t) // 2], r"timing\.csv, row \d+ = '\d fields instead of 4'"),
+        (lambda t: t[: len(t) // 2], r"timing\.csv, row \d+ = '\d fields instead of 7'"),
         (lambda t: t.replace(t.splitlines()[9].split(",")[1], "nan"), r"timing.csv, row 10 = .s_m"),
         (lambda t: "".join(t.splitlines(True)[:9]), "timing.csv: damaged: its content"),
         (lambda t: t.replace("s_m", "S"), r"timing\.csv, row 1 = 'its columns are u, S, "),
@@ -432,7 +432,7 @@ def test_folders_of_every_job_stand_alone(tmp_path: Path) -> None:
     )
     solution = trajopt.solve(trajopt.load_problem(file))
     assert solution.holds, solution.faults
-    write_solution(solution, tmp_path / "run", seed=0, pictures=True)
+    write_solution(solution, tmp_path / "run", seed=0, pictures="png")
     assert {"path.png", "profile.png"} <= {f.name for f in (tmp_path / "run").iterdir()}
     assert not (tmp_path / "run" / "convergence.png").exists()
     shutil.move(tmp_path / "run", tmp_path / "elsewhere")

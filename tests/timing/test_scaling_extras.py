@@ -1,10 +1,6 @@
-"""Stops, start speeds, segments, linear factors, sensitivities, momentum, and life without
-numba."""
+"""Stops, start speeds, segments, linear factors, sensitivities, momentum."""
 
 from __future__ import annotations
-
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -154,27 +150,3 @@ def test_momentum_carries_over_a_patch_where_rest_breaks_a_limit():
     with pytest.raises(InfeasibleError) as caught:
         time_scale(path, limits, robot=ROBOTS["rear_cog"], stops=[steep])
     assert caught.value.limit == "slip"
-
-
-def test_without_numba_time_scaling_falls_to_toppra_and_says_so():
-    code = """
-import sys
-sys.modules["numba"] = None
-import importlib.util
-found = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "numba" else found(name, *rest)
-from trajopt.errors import MissingDependencyError
-from trajopt.limits.registry import LIMITS
-from trajopt.paths.path import Path
-from trajopt.robots.robot import robot as shipped
-from trajopt.timing.scaling import time_scale
-path = Path.through([[0, 0], [1, 0.3], [2, 0]], heading=[0, 0.5, 0])
-limits = [LIMITS["speed"](1.0), LIMITS["wheel_acceleration"](10.0)]
-print(time_scale(path, limits, robot=shipped("loc8"), gridpoints=50).engine)
-try:
-    time_scale(path, limits, robot=shipped("loc8"), engine="compiled")
-except MissingDependencyError as error:
-    print(error.extra)
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["toppra", "speed"]

@@ -69,12 +69,14 @@ def test_a_wheel_turns_at_a_stop_in_the_rest_to_rest_time(rate: float, accelerat
     wanted = QUARTER / rate if np.isinf(acceleration) else rest_to_rest(QUARTER, rate, acceleration)
     assert rest.duration == pytest.approx(wanted, rel=1e-9)
     np.testing.assert_allclose(rest.wheels, [QUARTER, 0, 0, 0], atol=1e-8)
+    assert found.waits.sum() == pytest.approx(wanted, rel=1e-12)
+    # s'' varies a little inside a cell, so the mean of speeds tells its time only nearly.
     moving = np.sum(2 * np.diff(found.s) / (found.sd[1:] + found.sd[:-1]))
-    assert found.duration == pytest.approx(moving + wanted, rel=1e-12)
+    assert found.duration == pytest.approx(moving + wanted, rel=1e-5)
     i = int(np.argmax(found.waits))
     assert found.s[i] == pytest.approx(place)
     leave, come = found.times[i], found.times[i] - wanted
-    inside = np.linspace(come, leave, 101)
+    inside = np.linspace(come + 1e-12, leave, 101)  # the sum of times rounds
     s, speed, push = found.along(inside)
     assert np.ptp(s) == 0
     assert not speed.any()

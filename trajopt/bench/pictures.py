@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,61 +14,58 @@ from matplotlib.ticker import NullFormatter
 from trajopt.arrays import Array
 from trajopt.bench.profiles import data_profile, ecdf, performance_profile
 from trajopt.bench.tables import BenchTables, Unit
-from trajopt.files import whole_file
+from trajopt.report.files import FORMATS
 from trajopt.report.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILION,
+    LINE_COLOURS,
+    MOST_LINES,
+    first_in_front,
     in_style,
     new_figure,
+    save_figure,
 )
 
-_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK, GREY)
-_DASHES = ("-", "--", ":")
-_SHOWN = (
-    "pso",
-    "pso-gbest",
-    "pso-thesis-enhanced",
-    "pyswarms",
-    "cma-es",
-    "differential-evolution",
-    "auto",
-    "lattice",
-    "ipopt",
-    "slsqp",
-    "l-bfgs-b",
-    "least-squares",
-)  # in the small pictures, where they apply
 PROFILE_SHARE = (
     1e-5  # of reference - best: the accuracy of data and performance profiles; Moré and Wild's tau
 )
 
 
 def save_bench_pictures(tables: BenchTables, out: Path) -> dict[str, tuple[str, Figure]]:
-    """Draw the figures of a benchmark as PNG and SVG into ``out``: title -> name of the PNG, figure."""
+    """Draw the figures of a benchmark as PNG, PDF and SVG into ``out``: title -> name of the PNG, figure."""
     accuracy = f"(accuracy {PROFILE_SHARE:g})"
     drawn = {
-        "Targets reached (ECDF over problems, seeds and targets)": ("ecdf", _ecdf_figure),
-        f"Data and performance profiles {accuracy}": ("profiles", _profile_figure),
-        "Targets reached over time, family by family": ("families", _family_figure),
+        "Targets reached (ECDF over problems, seeds and targets)": ("ecdf", ecdf_figure),
+        f"Data and performance profiles {accuracy}": ("profiles", profiles_figure),
+        "Targets reached over time, family by family": ("families", families_figure),
     }
     found = {}
     with in_style():
         for title, (name, draw) in drawn.items():
             figure = draw(tables)
             found[title] = (f"{name}.png", figure)
-            for kind in ("svg", "png"):
-                with whole_file(out / f"{name}.{kind}") as part:
-                    figure.savefig(part, format=kind)
+            for kind in FORMATS:
+                save_figure(figure, out / f"{name}.{kind}")
     return found
 
 
-def _ecdf_figure(tables: BenchTables) -> Figure:
+def shown(tables: BenchTables) -> dict[str, str]:
+    """Colours of the optimizers that pictures show: as many of the leading ones as can be told apart; tables hold
+    all."""
+    return dict(zip(tables.leaders[:MOST_LINES], LINE_COLOURS, strict=False))
+
+
+def _legend(figure: Figure, tables: BenchTables, named: Mapping[str, Artist]) -> None:
+    left = len(tables.optimizers) - len(shown(tables))
+    title = f"{left} others: see the tables" if left else None
+    figure.legend(named.values(), named.keys(), loc="outside right upper", title=title)
+
+
+def _named(axes: Axes) -> dict[str, Artist]:
+    handles, labels = axes.get_legend_handles_labels()
+    return dict(zip(labels, handles, strict=True))
+
+
+def ecdf_figure(tables: BenchTables) -> Figure:
+    """Share of targets reached over evaluations, evaluations with gradients, and seconds."""
     figure = new_figure(3.8, 9.5)
     columns = figure.subplots(1, 3, sharey=True)
     units: tuple[Unit, ...] = ("evaluations", "evaluations and gradients", "seconds")
@@ -77,14 +74,15 @@ def _ecdf_figure(tables: BenchTables) -> Figure:
         if unit != "seconds":
             times = times / tables.dimension[:, None, None, None]
         _curves(axes, tables, times, ecdf)
-        axes.set_xlabel("seconds" if unit == "seconds" else f"{unit} / dimension")
-    columns[0].set_ylabel("share of targets reached")
+        axes.set_xlabel("time (s)" if unit == "seconds" else f"{unit} / dimension (–)")
+    columns[0].set_ylabel("share of targets reached (–)")
     columns[1].set_title("gradients count as n evaluations")
-    figure.legend(*columns[2].get_legend_handles_labels(), loc="outside right upper")
+    _legend(figure, tables, _named(columns[2]))
     return figure
 
 
-def _profile_figure(tables: BenchTables) -> Figure:
+def profiles_figure(tables: BenchTables) -> Figure:
+    """Data profile over evaluations and performance profile over seconds."""
     figure = new_figure(3.8, 9.5)
     left, right = figure.subplots(1, 2, sharey=True)
 
@@ -93,29 +91,29 @@ def _profile_figure(tables: BenchTables) -> Figure:
 
     evaluations = tables.times("evaluations", [PROFILE_SHARE])[..., 0]
     _curves(left, tables, evaluations, solved, scale=1 / 3)
-    left.set_xlabel("evaluations / (dimension + 1)")
-    left.set_ylabel("share solved")
+    left.set_xlabel("evaluations / (dimension + 1) (–)")
+    left.set_ylabel("share solved (–)")
     left.set_title("data profile")
     ratios = np.geomspace(1.0, 1e4, 200)
     curves = performance_profile(tables.times("seconds", [PROFILE_SHARE])[..., 0], ratios)
-    for k, name in enumerate(tables.optimizers):
-        _steps(right, ratios, curves[:, k], k, name)
+    for name, colour in shown(tables).items():
+        _steps(right, ratios, curves[:, tables.optimizers.index(name)], colour, name)
+    first_in_front(right)
     right.set_xscale("log")
-    right.set_xlabel("seconds / seconds of the fastest")
+    right.set_xlabel("time / time of the fastest (–)")
     right.set_title("performance profile")
-    figure.legend(*right.get_legend_handles_labels(), loc="outside right upper")
+    _legend(figure, tables, _named(right))
     return figure
 
 
-def _family_figure(tables: BenchTables) -> Figure:
-    """One small picture a family: share of targets reached over seconds, of the methods people
-    choose between."""
+def families_figure(tables: BenchTables) -> Figure:
+    """One small picture a family: share of targets reached over seconds."""
     families = tables.families()
     rows, columns = (len(families) + 3) // 4, min(4, len(families))
     figure = new_figure(2.4 * rows + 0.4, 10.0)
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    chosen = [k for k, name in enumerate(tables.optimizers) if name in _SHOWN]
-    times = tables.times("seconds")[:, chosen]
+    colours = shown(tables)
+    times = tables.times("seconds")[:, [tables.optimizers.index(name) for name in colours]]
     named: dict[str, Artist] = {}
     for axes, (family, places) in zip(grid, families.items(), strict=False):
         part = times[places]
@@ -128,16 +126,15 @@ def _family_figure(tables: BenchTables) -> Figure:
             continue
         budgets = np.geomspace(finite.min(), finite.max(), 200)
         curves = ecdf(part, budgets)
-        for i, k in enumerate(chosen):
-            name = tables.optimizers[k]
-            _steps(axes, budgets, curves[:, i], k, name)
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
+        for i, (name, colour) in enumerate(colours.items()):
+            _steps(axes, budgets, curves[:, i], colour, name)
+        first_in_front(axes)
+        named = _named(axes) | named
     for axes in grid[len(families) :]:
         axes.set_axis_off()
-    figure.legend(named.values(), named.keys(), loc="outside right upper", fontsize=8)
-    figure.supxlabel("seconds of processor time", fontsize=9)
-    figure.supylabel("share of targets reached", fontsize=9)
+    _legend(figure, tables, named)
+    figure.supxlabel("processor time (s)", fontsize=9)
+    figure.supylabel("share of targets reached (–)", fontsize=9)
     return figure
 
 
@@ -153,13 +150,12 @@ def _curves(
         return
     budgets = np.geomspace(finite.min() * scale, finite.max(), 200)
     curves = share(times, budgets)
-    for k, name in enumerate(tables.optimizers):
-        _steps(axes, budgets, curves[:, k], k, name)
+    for name, colour in shown(tables).items():
+        _steps(axes, budgets, curves[:, tables.optimizers.index(name)], colour, name)
+    first_in_front(axes)
     axes.set_xscale("log")
     axes.set_ylim(0.0, 1.02)
 
 
-def _steps(axes: Axes, x: Array, y: Array, place: int, name: str) -> None:
-    """One optimizer's step curve; its ``place`` in the order chooses colour and dash."""
-    colour, dash = _COLOURS[place % 8], _DASHES[place // 8 % 3]
-    axes.step(x, y, label=name, where="post", color=colour, ls=dash)
+def _steps(axes: Axes, x: Array, y: Array, colour: str, name: str) -> None:
+    axes.step(x, y, label=name, where="post", color=colour)

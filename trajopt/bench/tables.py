@@ -63,6 +63,15 @@ class BenchTables:
         return tuple(sorted({str(row["optimizer"]) for row in self.rows}))
 
     @cached_property
+    def leaders(self) -> tuple[str, ...]:
+        """All optimizers, those first that reach most targets in the mean over the families of problems; a search that
+        is not there reached none."""
+        reached = np.isfinite(self.times("evaluations"))
+        shares = [reached[places].mean(axis=(0, 2, 3)) for places in self.families().values()]
+        order = np.argsort(-np.mean(shares, axis=0), kind="stable")
+        return tuple(self.optimizers[k] for k in order)
+
+    @cached_property
     def best(self) -> dict[str, tuple[float, str]]:
         return best_costs(self.rows)
 

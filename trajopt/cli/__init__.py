@@ -5,19 +5,20 @@ from __future__ import annotations
 
 import importlib
 import sys
+from typing import Annotated
 
 import typer
 
+import trajopt
 from trajopt.cli import bench, paths, robot, search, sweep, view
 from trajopt.cli.shared import INTERRUPTED, leaving
 from trajopt.errors import TrajoptError
-from trajopt.report.words import PlainConsole
 
 app = typer.Typer(
-    add_completion=False,
+    rich_markup_mode=None,  # rich takes twice as long to load as all the rest
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    help="Plan, time and check motions of wheeled ground robots.",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 # modules of systems that bring commands of their own (``COMMANDS``): one line a system
 SYSTEMS = ("trajopt.systems.smdw.commands",)
@@ -40,13 +41,30 @@ app.add_typer(sweep.app, name="sweep")
 UNUSABLE = 2
 
 
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"trajopt {trajopt.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _first(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="say it, and end")
+    ] = False,
+) -> None:
+    """Plan, time and check motions of wheeled ground robots."""
+
+
 def main() -> None:
     """Entry point: errors of the package become one line on standard error."""
     try:
         with leaving("interrupted"):
-            app()
+            app(prog_name="trajopt")
     # OSError: a folder that cannot be made, a full disk: the message names the file
     except (TrajoptError, OSError) as error:
+        from trajopt.report.console import PlainConsole
+
         PlainConsole(stderr=True, soft_wrap=True).print(f"error: {error}")
         sys.exit(UNUSABLE)
     except KeyboardInterrupt:

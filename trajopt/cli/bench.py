@@ -6,14 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from trajopt.cli.shared import console
 from trajopt.cli.sweep import KeepOld, Rerun, old_rows
@@ -73,6 +65,15 @@ def run(
         f"{plan.title}: {len(plan.problems)} problems, {len(plan.optimizers)} optimizers, {total} searches; "
         f"rows in {place}"
     )
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich import box
-from rich.table import Table
 
-from trajopt.cli.shared import Overrides, console, overrides
+from trajopt.cli.shared import Overrides, console, overrides, simple_table
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -37,16 +35,16 @@ def explain(
         words(
             (str(plan), "bold"),
             f": {trajectory.duration:.4f} s over {trajectory.path.length:.3f} m "
-            f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e})",
+            f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e}{_near(trajectory)})",
         )
     )
-    stretches = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    stretches = simple_table()
     for column in ("from s (m)", "to s (m)", "limit that binds"):
         stretches.add_column(column, justify="left" if "limit" in column else "right")
     for stretch in trajectory.active:
         stretches.add_row(f"{stretch.start:.3f}", f"{stretch.end:.3f}", stretch.limit)
     console.print(stretches)
-    limits = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    limits = simple_table()
     for column in ("limit", "least margin", "at s (m)", "1 % more saves (s)"):
         limits.add_column(column, justify="left" if column == "limit" else "right")
     optimal = trajectory.engine in ENGINES  # only of those one can say what a limit costs
@@ -62,7 +60,7 @@ def explain(
         shown = f"{margin if margin < -1e-9 else max(margin, 0.0):.2%}"
         limits.add_row(name, shown, f"{places[name]:.3f}", saved)
     console.print(limits)
-    extremes = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    extremes = simple_table()
     for column in ("on the way", "up to", "at s (m)"):
         extremes.add_column(column, justify="left" if column == "on the way" else "right")
     for name, value, place in most(trajectory):
@@ -102,7 +100,7 @@ def compare(
     from trajopt.control.commands import compare_log
 
     found = compare_log(_timed(plan, set_, "auto"), log)
-    table = Table(box=box.SIMPLE_HEAD, show_header=False, pad_edge=False)
+    table = simple_table(show_header=False)
     for name, value in (
         ("speed error", f"{found.speed_error:.4f} m/s"),
         ("heading error", f"{found.heading_error:.4f} rad"),
@@ -133,3 +131,9 @@ def _timed(plan: Path, set_: list[str] | None, engine: str) -> Trajectory:
             "plan", str(plan), "a problem with a feasible motion; " + solution.status
         )
     return solution.trajectory
+
+
+def _near(trajectory: Trajectory) -> str:
+    """How far above the least time the duration can be."""
+    gap = trajectory.gap
+    return "" if gap is None else f", at most {100 * gap:.2g} % above the least time"

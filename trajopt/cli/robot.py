@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich import box
-from rich.table import Table
 
-from trajopt.cli.shared import FAULTY, Overrides, console, overrides
+from trajopt.cli.shared import FAULTY, Overrides, console, overrides, simple_table
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -30,7 +28,7 @@ def robot(
     ] = None,
     set_: Overrides = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="file for a view from above (*.png)")
+        Path | None, typer.Option("--out", help="file for a view from above (*.png, *.pdf, *.svg)")
     ] = None,
 ) -> None:
     """What a robot is: wheels, mobility, checks, and a view from above."""
@@ -65,7 +63,7 @@ def robot(
 def _list(robots: list[Robot]) -> None:
     from trajopt.robots.mobility import mobility_of
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = simple_table()
     for column in ("robot", "kg", "wheels", "mobility, steerability", "about"):
         table.add_column(column, justify="right" if column == "kg" else "left")
     for one in robots:

@@ -13,14 +13,15 @@ from trajopt.cli.shared import (
     INTERRUPTED,
     Bar,
     ControlOption,
+    FormatOption,
     Overrides,
     ProblemFile,
     console,
     control_mode,
     overrides,
+    picture_kind,
 )
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
 from trajopt.report.words import words
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ def solve(
         bool, typer.Option(help="save the search in --out, and go on where it is saved there")
     ] = False,
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
+    format_: FormatOption = None,
 ) -> None:
     """Do the job of a problem (search, time a path, plan a climb), and write what was found."""
     from trajopt.optimize.base import Status
@@ -62,6 +64,7 @@ def solve(
     from trajopt.problem import load_problem
     from trajopt.report.tables import solution_table
 
+    kind = picture_kind(pictures, format_)
     loaded = load_problem(problem, overrides(set_))
     optimizer = _of_plugin(optimizer, plugin)
     budget = _budget(evaluations, seconds, target)
@@ -81,7 +84,7 @@ def solve(
         )
     console.print(solution_table(solution))
     if out is not None:
-        _write(solution, out, seed, pictures)
+        _write(solution, out, seed, kind)
     if not solution.holds:
         for fault in solution.faults:
             console.print(words(("does not hold:", "red"), f" {fault}"))
@@ -101,12 +104,14 @@ def validate(
         int, typer.Option(help="seed of the measured pose's noise, with --control")
     ] = 0,
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
+    format_: FormatOption = None,
 ) -> None:
     """Drive a saved solution in a physics engine with real rollers and measure the deviation."""
     from trajopt.pipeline import validate as validate_trajectory
     from trajopt.report.run_folder import read_solution, write_validation
     from trajopt.report.tables import validation_table
 
+    kind = picture_kind(pictures, format_)
     solution = read_solution(folder)
     if solution.trajectory is None:
         raise ArgumentError(
@@ -125,10 +130,10 @@ def validate(
         )
     console.print(validation_table(report, solution.problem.robot))
     write_validation(report, folder, solution.problem.robot)
-    if pictures:
+    if kind:
         from trajopt.report.pictures import save_physics_picture
 
-        save_physics_picture(solution, report, folder)
+        save_physics_picture(solution, report, folder, kind)
         if report.recording.no_picture:
             console.print(f"no engine.png: {report.recording.no_picture}")
     console.print(f"written to {folder}", soft_wrap=True)
@@ -157,11 +162,13 @@ def schema(
     if out is None:
         sys.stdout.write(text)
     else:
+        from trajopt.files import whole_file
+
         with whole_file(out) as part:
             part.write_text(text, encoding="utf-8")
 
 
-def _write(solution: Solution, out: Path, seed: int, pictures: bool) -> None:
+def _write(solution: Solution, out: Path, seed: int, pictures: str | None) -> None:
     from trajopt.report.run_folder import write_solution
 
     write_solution(solution, out, seed=seed, command=" ".join(sys.argv), pictures=pictures)

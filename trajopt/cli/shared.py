@@ -10,18 +10,31 @@ import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from trajopt.control.approach import Mode
 from trajopt.errors import ArgumentError
-from trajopt.report.words import PlainConsole
 
-console = PlainConsole(
-    width=None if sys.stdout.isatty() else 120
-)  # tables keep their shape when piped
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from trajopt.control.approach import Mode
+
+
+class _Output:
+    """The console, made when something is printed: rich takes as long to load as a short command."""
+
+    def __getattr__(self, name: str) -> Any:
+        from trajopt.report.console import PlainConsole
+
+        # tables keep their shape when piped
+        made = PlainConsole(width=None if sys.stdout.isatty() else 120)
+        self.__dict__.update({"print": made.print, "made": made})
+        return getattr(made, name)
+
+
+console: Any = _Output()
 
 FAULTY = 1
 INTERRUPTED = 130  # as shells say it of Ctrl-C
@@ -41,6 +54,9 @@ ControlOption = Annotated[
         help="none (planned wheel speeds), servo (planned wheel angles), pose, or pose-and-phase",
     ),
 ]
+FormatOption = Annotated[
+    str | None, typer.Option("--format", help="of pictures: png (default), pdf or svg")
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
@@ -49,6 +65,24 @@ Overrides = Annotated[
         show_default=False,
     ),
 ]
+
+
+def picture_kind(pictures: bool, kind: str | None) -> str | None:
+    """The format of pictures, None where there shall be none. Raises ArgumentError for another format, or one beside
+    --no-pictures."""
+    from trajopt.report.files import FORMATS
+
+    if kind is not None and (kind not in FORMATS or not pictures):
+        raise ArgumentError("--format", kind, f"one of {', '.join(FORMATS)}, without --no-pictures")
+    return (kind or "png") if pictures else None
+
+
+def simple_table(**options: Any) -> Table:
+    """A table without borders."""
+    from rich import box
+    from rich.table import Table
+
+    return Table(box=box.SIMPLE_HEAD, pad_edge=False, **options)
 
 
 def overrides(items: list[str] | None) -> dict[str, Any]:
@@ -108,28 +142,38 @@ class Bar:
     """Progress on a terminal; nothing when the output is piped."""
 
     def __init__(self, name: str, total: int | None) -> None:
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[best]}"),
-            TimeElapsedColumn(),
+        self._progress: Any = None
+        if not sys.stderr.isatty():
+            return
+        from rich import progress as bars
+
+        from trajopt.report.console import PlainConsole
+
+        self._progress = bars.Progress(
+            bars.TextColumn("{task.description}"),
+            bars.BarColumn(),
+            bars.TextColumn("{task.fields[best]}"),
+            bars.TimeElapsedColumn(),
             console=PlainConsole(stderr=True),
             transient=True,
-            disable=not sys.stderr.isatty(),
         )
         self._task = self._progress.add_task(name, total=total, best="")
 
     def __enter__(self) -> Bar:
-        self._progress.start()
+        if self._progress is not None:
+            self._progress.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._progress.stop()
+        if self._progress is not None:
+            self._progress.stop()
 
     def count(self, done: int) -> None:
         """Show how much is done."""
-        self._progress.update(self._task, completed=done)
+        if self._progress is not None:
+            self._progress.update(self._task, completed=done)
 
     def update(self, evaluations: int, best: float) -> None:
         """Show how many evaluations are used and the best cost so far."""
-        self._progress.update(self._task, completed=evaluations, best=f"best {best:.3g}")
+        if self._progress is not None:
+            self._progress.update(self._task, completed=evaluations, best=f"best {best:.3g}")

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
-from rich.table import Table
 
-from trajopt.cli.shared import console, leaving
+from trajopt.cli.shared import FormatOption, console, leaving, picture_kind
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
-from trajopt.report.words import PlainConsole, words
+from trajopt.report.words import words
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -165,6 +163,8 @@ def status(store: StorePath) -> None:
 
     place = open_store(store, create=False)
     counts, runs = place.counts(), place.runs()
+    from rich.table import Table
+
     shown = Table("status", "cases", title=str(store), title_justify="left")
     for name, count in counts.items():
         shown.add_row(name, str(count))
@@ -197,6 +197,8 @@ def show(
     from trajopt.sweeps.store import open_store
 
     row, arrays = open_store(store, create=False).case(case)
+    from rich.table import Table
+
     shown = Table("name", "value", title=f"case {row['case']}", title_justify="left")
     for name, value in row.items():
         if value is not None and name not in ("case", "error_traceback"):
@@ -217,15 +219,17 @@ def report(
         Path | None, typer.Option("--out", help="folder; default: out/report/<case>")
     ] = None,
     store: StoreOption = None,
+    format_: FormatOption = None,
 ) -> None:
     """Draw the pictures of one case out of a sweep, or of a folder that solve wrote, again."""
     from trajopt.sweeps.store import open_store
 
+    kind = picture_kind(True, format_) or "png"
     if not case:
         from trajopt.report.pictures import save_pictures
         from trajopt.report.run_folder import read_solution
 
-        files = list(save_pictures(read_solution(source), out or source))
+        files = list(save_pictures(read_solution(source), out or source, kind))
     else:
         from trajopt.report.sweep_case import report_case
         from trajopt.sweeps.sweepfile import load_sweep
@@ -233,7 +237,7 @@ def report(
         plan = None if source.is_dir() else load_sweep(source)
         place = source if plan is None else store or _default_store(source)
         files = report_case(
-            open_store(place, create=False), case, out or Path("out") / "report" / case, plan
+            open_store(place, create=False), case, out or Path("out") / "report" / case, plan, kind
         )
     for file in files:
         console.print(f"wrote {file}", soft_wrap=True)
@@ -283,6 +287,8 @@ def export(
     place = open_store(store, create=False)
     if out.suffix not in (".csv", ".parquet", ".jsonl"):
         raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
+    from trajopt.files import whole_file
+
     with whole_file(out) as part:
         match out.suffix:
             case ".csv":
@@ -299,7 +305,7 @@ def export(
 @app.command()
 def plot(
     store: StorePath,
-    out: Annotated[Path, typer.Argument(help="picture to write (*.png)")],
+    out: Annotated[Path, typer.Argument(help="picture to write (*.png, *.pdf, *.svg)")],
     value: Annotated[str, typer.Option(help="result to show")] = "",
     x: Annotated[str, typer.Option(help="column along x")] = "",
     y: Annotated[str, typer.Option(help="column along y: a heat map")] = "",
@@ -377,6 +383,8 @@ def _dry_run(plan: SweepPlan, workers: int) -> None:
 
     console.print(f"{plan.title}: {len(plan.table)} cases")
     first = plan.table.take(np.arange(min(_SHOWN, len(plan.table)))).rows()
+    from rich.table import Table
+
     shown = Table("case", *plan.table.columns)
     for case in first:
         shown.add_row(
@@ -415,6 +423,8 @@ def _print_errors(store: Store) -> None:
     failed = frame[frame["status"] != "done"]
     if failed.empty:
         return
+    from rich.table import Table
+
     shown = Table(
         "cases", "error", "first message", "first case", title="not done", title_justify="left"
     )
@@ -438,6 +448,8 @@ def _engine(name: str, workers: int, host: str, tls: Path | None) -> Engine:
         )
     if host not in ("127.0.0.1", "::1", "localhost") and tls is None:
         told = f"--host {host}: whoever reaches it can run code as you, as Dask asks no password; see --tls"
+        from trajopt.report.console import PlainConsole
+
         PlainConsole(stderr=True).print(f"warning: {told}")
 
     count = workers or engines.available_processors()
@@ -456,6 +468,8 @@ def _engine(name: str, workers: int, host: str, tls: Path | None) -> Engine:
 def _bar(total: int) -> Iterator[Callable[[Progress], None]]:
     """Progress with rate and remaining time on a terminal; a line a minute where there is none."""
     from rich import progress as bars
+
+    from trajopt.report.console import PlainConsole
 
     bar = bars.Progress(
         bars.TextColumn("{task.fields[failed]}"),

@@ -37,6 +37,7 @@ _WANTED_SLOWDOWN = 1.01  # of time; chosen: beyond it intervals are split
 _MOST_SLOWDOWN = 1.05  # of time; chosen: beyond it the result is refused
 # Tables as the rows are, then the strictest rows around a place, and programs solved with each at
 # most; chosen: the first are closer where rows are smooth, the second hold where they jump (ramps).
+_STARTS = 1.0, 1.3  # times the stretched time-optimal motion: there are several optima; chosen
 _ATTEMPTS = ((False, 2), (True, 3))
 _PARTS = 3  # an interval is split into; chosen
 _SPLIT_ABOVE = 1e-3  # relative violation that splits an interval, or puts a row in; chosen
@@ -128,11 +129,38 @@ def limit_jerk(
         raise ArgumentError("trajectory", [rest.s for rest in trajectory.rests], expected)
     used = trajectory.limits if limits is None else limits
     source = replace(trajectory, limits=used)
+    found: list[SmoothMotion] = []
+    failure: InfeasibleError | None = None
+    for slower in _STARTS:
+        try:
+            guess = _first_guess(trajectory, jerk, nodes, slower)
+            found.append(_from(source, jerk, nodes, guess, tolerance))
+        except InfeasibleError as error:
+            failure = error
+    if not found:
+        assert failure is not None
+        raise failure
+    best = min(found, key=lambda motion: (motion.slowdown > _MOST_SLOWDOWN, motion.duration))
+    if best.slowdown <= _MOST_SLOWDOWN:
+        return best
+    name, margin = min(best.margins().items(), key=lambda item: item[1])
+    raise InfeasibleError(
+        name,
+        0.0,
+        f"it is broken between {len(best.jerk)} nodes and would cost a factor of "
+        f"{best.slowdown:.3g} on time (least margin {margin:.2g}); take more nodes",
+    )
+
+
+def _from(
+    source: Trajectory, jerk: float, nodes: int, guess: Array, tolerance: float
+) -> SmoothMotion:
+    """The shortest motion found from one start. Raises InfeasibleError."""
     best: SmoothMotion | None = None
     failure: InfeasibleError | None = None
+    first = guess
     for strict, rounds in _ATTEMPTS:
-        shares, put_in = np.full(nodes, 1 / nodes), _near(source)
-        guess = _first_guess(trajectory, jerk, nodes)
+        shares, put_in, guess = np.full(nodes, 1 / nodes), _near(source), first
         for _ in range(rounds):
             if best is not None and best.slowdown <= _WANTED_SLOWDOWN:
                 return best
@@ -148,15 +176,7 @@ def limit_jerk(
     if best is None:
         assert failure is not None
         raise failure
-    if best.slowdown <= _MOST_SLOWDOWN:
-        return best
-    name, margin = min(best.margins().items(), key=lambda item: item[1])
-    raise InfeasibleError(
-        name,
-        0.0,
-        f"it is broken between {len(best.jerk)} nodes and would cost a factor of "
-        f"{best.slowdown:.3g} on time (least margin {margin:.2g}); take more nodes",
-    )
+    return best
 
 
 def _near(source: Trajectory) -> BoolArray:
@@ -275,11 +295,11 @@ def _without_ringing(values: Array) -> Array:
     return np.asarray((around[:-2] + 4 * around[1:-1] + around[2:]) / 6)
 
 
-def _first_guess(trajectory: Trajectory, jerk: float, n: int) -> Array:
+def _first_guess(trajectory: Trajectory, jerk: float, n: int, slower: float) -> Array:
     """The time-optimal motion, run slower by what its largest accelerations need to build up at
-    ``jerk``."""
+    ``jerk``, and by the factor ``slower``."""
     peak = float(np.abs(trajectory.sdd).max())
-    stretch = 1.0 + peak / jerk / trajectory.duration
+    stretch = slower * (1.0 + peak / jerk / trajectory.duration)
     t = np.linspace(0.0, trajectory.duration, n + 1)
     s, v, a = trajectory.along(t)
     v, a = v / stretch, a / stretch**2

@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from trajopt.arrays import Array, BoolArray
+from trajopt.errors import ArgumentError
 from trajopt.optimize.base import FEASIBLE, OptimizeResult, Status
-from trajopt.report.style import BLUE, GREY, ORANGE, VERMILION, new_figure
+from trajopt.report.style import (
+    BLUE,
+    GREY,
+    LINE_COLOURS,
+    ORANGE,
+    VERMILION,
+    first_in_front,
+    new_figure,
+)
 from trajopt.solution import Solution
 
 _DECADES = 1.0  # an axis is logarithmic where its values span more decades than this, chosen
+_BAND = (10.0, 90.0)  # percentiles between which the band of several seeds lies, chosen
 _FLOOR = 1e-16  # smallest cost drawn on a logarithmic axis: rounding of doubles
 _WORDS = {
     Status.EVALUATIONS: "budget used up",
@@ -42,14 +54,15 @@ def convergence_figure(solution: Solution, search: OptimizeResult) -> Figure:
         )
     else:
         drawn = _curve(cost, search, history.cost, feasible, search.fun)
-    _log_where_wide(cost, drawn)
+    log_where_wide(cost, drawn)
     cost.set_ylabel(f"{kind} ({unit})" if timed else "terminal cost (–)")
     if violation is not None:
         drawn = _curve(violation, search, history.violation, feasible, search.violation)
-        _log_where_wide(violation, drawn)
+        log_where_wide(violation, drawn)
         violation.set_ylabel("violation (–)")
     lowest = cost if violation is None else violation
-    lowest.set_xlabel("evaluations of the objective")
+    lowest.set_xlabel("evaluations of the objective (–)")
+    say_one_shot(cost, search)
     counts = history.evaluations[history.evaluations > 0]
     if counts.size and search.nfev / counts[0] > 10**_DECADES:
         lowest.set_xscale("log")
@@ -63,6 +76,69 @@ def convergence_figure(solution: Solution, search: OptimizeResult) -> Figure:
     )
     _legend(figure)
     return figure
+
+
+def one_shot(search: OptimizeResult) -> bool:
+    """Whether the first feasible candidate was the answer already, so that its curve is flat."""
+    feasible = search.history.violation <= FEASIBLE
+    return int(feasible.sum()) == 1 and search.status in (Status.TARGET, Status.CONVERGED)
+
+
+def say_one_shot(axes: Axes, search: OptimizeResult) -> None:
+    """A word on a curve that is flat."""
+    if one_shot(search):
+        text = f"{search.optimizer} finds its answer in one go: nothing converges"
+        axes.text(0.5, 0.55, text, transform=axes.transAxes, ha="center", color=GREY)
+
+
+def seeds_figure(searches: Mapping[str, Sequence[OptimizeResult]], unit: str = "–") -> Figure:
+    """Best feasible cost over evaluations of searches with several seeds, a line each name: the median, and a band from
+    the 10th to the 90th percentile. A search that has met no feasible candidate yet counts as infinitely costly.
+
+    Raises ArgumentError for more than 8 names, or a name without searches.
+    """
+    if not 1 <= len(searches) <= len(LINE_COLOURS) or not all(searches.values()):
+        raise ArgumentError("searches", list(searches), f"1 to {len(LINE_COLOURS)} names, each with results")  # fmt: skip
+    figure = new_figure(3.4)
+    axes = figure.add_subplot()
+    drawn = []
+    for (name, results), colour in zip(searches.items(), LINE_COLOURS, strict=False):
+        counts, best = best_of_seeds(results)
+        drawn.append(draw_band(axes, counts, best, colour, f"{name}, {len(results)} seeds"))
+    values = np.concatenate([part.ravel() for part in drawn])
+    log_where_wide(axes, values[np.isfinite(values)])
+    axes.set_xscale("log")
+    first_in_front(axes)
+    axes.set_xlabel("evaluations of the objective (–)")
+    axes.set_ylabel(f"best cost so far ({unit})")
+    axes.set_title("Median and 10-90 % of the seeds")
+    axes.legend()
+    return figure
+
+
+def best_of_seeds(results: Sequence[OptimizeResult]) -> tuple[Array, Array]:
+    """(N,) evaluations and (N, S) best feasible cost of each search by then, inf before there is one."""
+    counts = np.unique(np.concatenate([[r.nfev, *r.history.evaluations] for r in results]))
+    best = np.full((len(counts), len(results)), np.inf)
+    for k, result in enumerate(results):
+        good = result.history.violation <= FEASIBLE
+        for count, cost in zip(result.history.evaluations[good], result.history.cost[good], strict=True):  # fmt: skip
+            best[counts >= count, k] = cost
+    return counts.astype(np.float64), best
+
+
+def draw_band(axes: Axes, x: Array, values: Array, colour: str, label: str | None = None) -> Array:
+    """Steps of the median of (N, S) and a band around it; what was drawn, (3, N). Infinite values have no line."""
+    low, middle, high = np.percentile(
+        np.maximum(values, _FLOOR), (_BAND[0], 50.0, _BAND[1]), axis=1, method="nearest"
+    )
+    axes.step(x, np.where(np.isfinite(middle), middle, np.nan), where="post", color=colour, label=label)  # fmt: skip
+    top = np.where(
+        np.isfinite(high), high, max(2.0 * np.max(values[np.isfinite(values)], initial=0.0), _FLOOR)
+    )
+    shown = np.isfinite(low)
+    axes.fill_between(x, low, top, where=shown.tolist(), step="post", color=colour, alpha=0.18, linewidth=0)  # fmt: skip
+    return np.array([low, middle, high])
 
 
 def _final(solution: Solution) -> str:
@@ -143,7 +219,7 @@ def _is_wide(values: Array) -> bool:
     )
 
 
-def _log_where_wide(axes: Axes, values: Array) -> None:
+def log_where_wide(axes: Axes, values: Array) -> None:
     """A logarithmic axis for values over decades, or one tiny value; else a linear one from 0."""
     if not values.size:
         axes.set_yticks([])

@@ -11,6 +11,7 @@ from typing import Any
 from trajopt.errors import ArgumentError
 from trajopt.files import LARGEST_TABLE, content_of, seal, unseal, whole_file
 
+FORMATS = ("png", "pdf", "svg")  # of pictures
 FORMAT = 3  # of run folders; a reader of another number refuses
 
 

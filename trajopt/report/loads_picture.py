@@ -17,6 +17,7 @@ from trajopt.report.style import (
     legend_beside,
     limit_colour,
     new_figure,
+    telling,
 )
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 from trajopt.simulate.plan import wheel_plan
@@ -49,9 +50,10 @@ def loads_figure(solution: Solution, trajectory: Trajectory) -> Figure:
     )
     height.plot(s, trajectory.at(times).position[:, 2], color=BLACK)
     height.set_ylabel("height (m)")
-    for i, wheel in enumerate(robot.description.wheels):
-        look = {"color": WHEEL_COLOURS[i % 8], "linestyle": WHEEL_DASHES[i % 4]}
-        loads.plot(s, plan.loads[:, i], **look, linewidth=1.2, label=wheel.name)
+    for i in telling(plan.loads - plan.loads.mean(axis=0)):
+        look = {"color": WHEEL_COLOURS[i % 8], "linestyle": WHEEL_DASHES[i % 8]}
+        name = robot.description.wheels[i].name
+        loads.plot(s, plan.loads[:, i], **look, linewidth=1.2, label=name)
     share = robot.body.mass * STANDARD_GRAVITY / plan.loads.shape[1]
     loads.axhline(share, color=LIGHT, linewidth=0.9, zorder=0.8, label="even share of the weight")
     loads.set_ylim(min(0.0, float(plan.loads.min())), None)
@@ -71,7 +73,8 @@ def loads_figure(solution: Solution, trajectory: Trajectory) -> Figure:
 
 def _draw_use(axes: Axes, trajectory: Trajectory) -> None:
     times, used = limit_use(trajectory)
-    for k, limit in enumerate(trajectory.limits):
+    for k in telling(used):
+        limit = trajectory.limits[k]
         s = np.interp(times[:, k], trajectory.times, trajectory.s)
         colour = limit_colour(limit.name, k)
         axes.plot(s, used[:, k], color=colour, linewidth=1.2, label=limit.name.replace("_", " "))

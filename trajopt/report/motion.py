@@ -14,6 +14,7 @@ from trajopt.timing.trajectory import Trajectory
 
 _MOMENTS = 2001  # at which the largest is looked for, chosen
 SAMPLE_TIME = 0.01  # s, largest step of trajectory.csv; chosen: 100 rows a second
+MOST_ROWS = 20_000  # of trajectory.csv: 200 s in such steps, some 10 MB; chosen
 _INSIDE = (
     0.001,
     0.5,
@@ -22,14 +23,13 @@ _INSIDE = (
 
 
 def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
-    """The motion in equal steps of at most 10 ms, a column a name; units in the names.
+    """The motion at ``table_times``, a column a name; units in the names.
 
     Place and posture of the body in the world (``posture``); speeds in the body frame; angles and
     speeds of all wheels, from the trajectory's ``start_wheels`` on, and steering angles and rates
     of those that turn, castors included; ``energy_j``: work of the motors so far; ``limit`` names what binds ("" for nothing).
     """
-    count = max(2, int(np.ceil(trajectory.duration / SAMPLE_TIME)) + 1)
-    times = np.linspace(0.0, trajectory.duration, count)
+    times = table_times(trajectory)
     state, (s, speed, acceleration) = trajectory.at(times), trajectory.along(times)
     columns: dict[str, Any] = {"t_s": times}
     columns |= dict(zip(("x_m", "y_m", "yaw_rad"), state.pose.T, strict=True))
@@ -53,6 +53,28 @@ def trajectory_table(trajectory: Trajectory) -> dict[str, Any]:
         columns["energy_j"] = np.interp(s, trajectory.s, trajectory.energies)
     columns["limit"] = binding_at(trajectory, times)
     return columns
+
+
+def table_times(trajectory: Trajectory) -> Array:
+    """(N,): equal steps of at most 10 ms; where those were more than 20,001 rows, every cell of the
+    speed profile in equal parts instead (cells are short where the motion varies), as many as stay
+    below that, so that rows are at least as many as gridpoints."""
+    count = max(2, int(min(np.ceil(trajectory.duration / SAMPLE_TIME), MOST_ROWS + 1.0)) + 1)
+    if count <= MOST_ROWS + 1:
+        return np.linspace(0.0, trajectory.duration, count)
+    ends = np.unique(np.concatenate([trajectory.times, trajectory.times - trajectory.waits]))
+    ends = np.unique(np.append(0.0, ends))
+    parts = max(1, MOST_ROWS // (len(ends) - 1))
+    inside = ends[:-1, None] + np.diff(ends)[:, None] * (np.arange(parts) / parts)
+    return np.append(inside.ravel(), trajectory.duration)
+
+
+def sampled(trajectory: Trajectory) -> str:
+    """How the rows of ``trajectory_table`` are spread over time, in words."""
+    if trajectory.duration <= SAMPLE_TIME * MOST_ROWS:
+        return f"equal steps of at most {SAMPLE_TIME:g} s"
+    rows = len(table_times(trajectory))
+    return f"{rows} rows, parts of the speed profile's cells: steps of {SAMPLE_TIME:g} s were more than {MOST_ROWS} rows"
 
 
 def posture(rotation: Array) -> tuple[Array, Array]:
@@ -118,17 +140,14 @@ def limit_use(trajectory: Trajectory) -> tuple[Array, Array]:
     A share of 1 is all of the limit, more is broken. From the limits' own rows: 1 minus the
     relative margin, as ``Trajectory.margins`` defines it.
     """
-    u, sdd = trajectory.u, trajectory.sdd
-    shares = np.zeros((len(_INSIDE), len(sdd), len(trajectory.limits)))
-    times = np.empty((len(_INSIDE), len(sdd), 1))
+    moving = np.diff(trajectory.times) - trajectory.waits[1:]
+    shares = np.zeros((len(_INSIDE), len(moving), len(trajectory.limits)))
+    times = np.empty((len(_INSIDE), len(moving), 1))
     for j, part in enumerate(_INSIDE):
-        here = u[:-1] + part * np.diff(u)
-        s = trajectory.path.parameter(here)
-        sd2 = np.maximum(trajectory.sd[:-1] ** 2 + 2 * sdd * (s - trajectory.s[:-1]), 0.0)
-        times[j, :, 0] = trajectory.times[:-1] + 2 * (s - trajectory.s[:-1]) / (
-            trajectory.sd[:-1] + np.sqrt(sd2)
-        )
-        samples = replace(trajectory.track.samples(s, here), sd2=sd2)
+        times[j, :, 0] = trajectory.times[:-1] + part * moving
+        u, s, speed, sdd = trajectory.inside(part)
+        sd2 = speed**2
+        samples = replace(trajectory.track.samples(s, u), sd2=sd2)
         for k, limit in enumerate(trajectory.limits):
             rows = limit.rows(samples, trajectory.robot)
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -162,10 +181,18 @@ def column(wheel: str, quantity: str) -> str:
 
 def timing_table(trajectory: Trajectory) -> dict[str, Array]:
     """Gridpoints of the speed profile; s'' belongs to the interval after a gridpoint, so the last
-    has none."""
-    return {
+    has none. Where it is not constant there, the motion is told by sigma' and by sigma'' at both
+    ends of the interval (sigma: ``timing/spread.py``)."""
+    table = {
         "u": trajectory.u,
         "s_m": trajectory.s,
         "s_dot_m_s": trajectory.sd,
         "s_ddot_m_s2": np.append(trajectory.sdd, np.nan),
     }
+    profile = trajectory.profile
+    empty = np.full(len(trajectory.u), np.nan)
+    table["sigma_dot_squared_m2_s2"] = empty if profile is None else profile.y
+    for end in ("first", "last"):
+        pull = empty if profile is None else np.append(getattr(profile, end), np.nan)
+        table[f"sigma_ddot_{end}_m_s2"] = pull
+    return table

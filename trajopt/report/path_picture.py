@@ -56,7 +56,7 @@ def path_figure(solution: Solution, path: Path) -> Figure:
     if problem.space is not None:
         draw_space(axes, problem.space)
     if solution.search is not None:
-        _draw_explored(axes, solution, solution.search)
+        _draw_explored(axes, solution, solution.search, seen)
     draw_scene(axes, problem.scene, seen)
     for pose in poses[np.linspace(0, len(poses) - 1, _MOMENTS + 2).round().astype(int)[1:-1]]:
         draw_robot(axes, robot, pose, zorder=2.2)
@@ -103,8 +103,9 @@ def _poses(solution: Solution, path: Path) -> Array:
     return np.column_stack([path.position(u)[:, :2], path.yaw(u)])
 
 
-def _draw_explored(axes: Axes, solution: Solution, search: OptimizeResult) -> None:
-    """Explored positions of P1 and P2 as dots, fainter the more there are."""
+def _draw_explored(axes: Axes, solution: Solution, search: OptimizeResult, seen: Array) -> None:
+    """Explored positions of P1 and P2 as dots, fainter the more there are; the legend counts those in the picture,
+    around ``seen`` (N, 2), m."""
     names = terminal_objective(solution.problem).names
     samples = search.history.samples
     samples = samples[:: max(1, len(samples) // _MOST_DOTS)]
@@ -115,9 +116,13 @@ def _draw_explored(axes: Axes, solution: Solution, search: OptimizeResult) -> No
         if f"{point}.x_m" not in names:
             continue
         i = names.index(f"{point}.x_m")
+        places = samples[:, i : i + 2]
+        places = places[np.all((places >= seen.min(axis=0)) & (places <= seen.max(axis=0)), axis=1)]
+        if not len(places):
+            continue
         axes.scatter(
-            samples[:, i],
-            samples[:, i + 1],
+            places[:, 0],
+            places[:, 1],
             s=9,
             marker="o",
             linewidths=0,
@@ -132,7 +137,7 @@ def _draw_explored(axes: Axes, solution: Solution, search: OptimizeResult) -> No
             color=colour,
             alpha=0.7,
             linewidths=0,
-            label=f"explored {point.upper()} ({len(search.history.samples)})",
+            label=f"explored {point.upper()} ({len(places)} of {len(search.history.samples)})",
         )
 
 

@@ -17,19 +17,19 @@ from trajopt.report.style import (
     GREEN,
     GREY,
     LIGHT,
-    ORANGE,
-    PURPLE,
-    SKY,
+    LINE_COLOURS,
+    MOST_LINES,
     VERMILION,
     WHEEL_COLOURS,
     WHEEL_DASHES,
+    first_in_front,
     legend_beside,
     new_figure,
+    telling,
 )
 from trajopt.solution import Solution
 
 _SMOOTH = 0.3  # s, over which loads are averaged for the eye; chosen
-_LOAD_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK, GREY)
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
@@ -60,18 +60,19 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
     panels[1].set_ylabel("position error (mm)")
     panels[2].plot(times, error[:, 2], color=BLACK)
     panels[2].set_ylabel("yaw error (mrad)")
-    for i, name in enumerate(solution.problem.robot.wheel_names):
+    off, names = 1e3 * (recording.wheel_angles - planned_wheels), solution.problem.robot.wheel_names
+    for i in telling(off):
         panels[3].plot(
             times,
-            1e3 * (recording.wheel_angles[:, i] - planned_wheels[:, i]),
+            off[:, i],
             linewidth=1.1,
             color=WHEEL_COLOURS[i % 8],
             linestyle=WHEEL_DASHES[i % 8],
-            label=name,
+            label=names[i],
         )
     panels[3].set_ylabel("wheel error (mrad)")
     _draw_loads(panels[4], report)
-    for k, name in enumerate(turns):
+    for k, name in enumerate(turns[:MOST_LINES]):
         i = report.wheels.index(name)
         error_of = 1e3 * (report.steering[:, i] - report.wheel_plan.steering[:, i])
         look: dict[str, Any] = {"color": WHEEL_COLOURS[k % 8], "linestyle": WHEEL_DASHES[k % 8]}
@@ -97,17 +98,18 @@ def physics_figure(solution: Solution, report: ValidationReport) -> Figure:
 
 
 def _draw_loads(axes: Axes, report: ValidationReport) -> None:
-    """Loads as measured, smoothed, and dashed as planned."""
+    """Loads as measured, smoothed, and dashed as planned, of the wheels whose loads are furthest from the plan."""
     times, loads, plan = report.recording.times, report.recording.loads, report.wheel_plan.loads
     count = max(1, round(_SMOOTH * (len(times) - 1) / float(np.ptp(times))))
     kernel = np.ones(count) / count
     weight = np.convolve(np.ones(len(times)), kernel, "same")
-    for i, name in enumerate(report.wheels):
-        colour = _LOAD_COLOURS[i % len(_LOAD_COLOURS)]
-        smooth = np.convolve(loads[:, i], kernel, "same") / weight
-        axes.plot(times, smooth, color=colour, linewidth=1.0, label=name)
+    smoothed = np.column_stack([np.convolve(column, kernel, "same") / weight for column in loads.T])
+    for i in telling(smoothed - plan, MOST_LINES // 2):
+        colour = LINE_COLOURS[i % MOST_LINES]
+        axes.plot(times, smoothed[:, i], color=colour, linewidth=1.0, label=report.wheels[i])
         axes.plot(times, plan[:, i], color=colour, linewidth=1.0, linestyle="--")
     axes.set_ylabel("load (N)\ndashed: planned")
+    first_in_front(axes)
 
 
 def _draw_paths(axes: Axes, solution: Solution, report: ValidationReport) -> None:

@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
 
 
-def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath, ...]:
+def save_pictures(
+    solution: Solution, folder: str | FilePath, kind: str = "png"
+) -> tuple[FilePath, ...]:
     """Draw path.png, where there is a path, convergence.png, where control points were searched,
     profile.png, where there is a trajectory, and loads.png, where its robot stands on three wheels
-    or more. Returns the files.
+    or more; ``kind`` may be pdf or svg as well. Returns the files.
 
     Raises ArgumentError where the folder cannot be written.
     """
@@ -30,22 +32,22 @@ def save_pictures(solution: Solution, folder: str | FilePath) -> tuple[FilePath,
     with in_style():
         files = []
         if solution.path is not None:
-            files.append(save_figure(path_figure(solution, solution.path), place / "path.png"))
+            files.append(save_figure(path_figure(solution, solution.path), place / f"path.{kind}"))
         if solution.search is not None:
             figure = convergence_figure(solution, solution.search)
-            files.append(save_figure(figure, place / "convergence.png"))
+            files.append(save_figure(figure, place / f"convergence.{kind}"))
         timed = solution.trajectory
         if timed is not None:
-            files.append(save_figure(profile_figure(solution, timed), place / "profile.png"))
+            files.append(save_figure(profile_figure(solution, timed), place / f"profile.{kind}"))
             if stands(solution.problem.robot):
-                files.append(save_figure(loads_figure(solution, timed), place / "loads.png"))
+                files.append(save_figure(loads_figure(solution, timed), place / f"loads.{kind}"))
     return tuple(files)
 
 
 def save_physics_picture(
-    solution: Solution, report: ValidationReport, folder: str | FilePath
+    solution: Solution, report: ValidationReport, folder: str | FilePath, kind: str = "png"
 ) -> tuple[FilePath, ...]:
-    """Draw physics.png and, where the engine made a picture, engine.png, and write view.html anew.
+    """Draw physics.png (or of another ``kind``) and, where the engine made a picture, engine.png, and write view.html anew.
     Returns the pictures.
 
     Raises ArgumentError for a solution without a trajectory or a folder that cannot be written.
@@ -55,7 +57,7 @@ def save_physics_picture(
     place = made_folder(folder)
     write_view(solution, place)
     with in_style():
-        files = [save_figure(physics_figure(solution, report), place / "physics.png")]
+        files = [save_figure(physics_figure(solution, report), place / f"physics.{kind}")]
     if report.recording.picture is not None:
         from matplotlib.image import imsave
 

@@ -20,16 +20,19 @@ from trajopt.report.style import (
     GREEN,
     GREY,
     LIGHT,
+    MOST_LINES,
     VERMILION,
     WHEEL_COLOURS,
     WHEEL_DASHES,
     legend_beside,
     limit_colour,
     new_figure,
+    telling,
 )
 from trajopt.robots.steering import steering_of
 from trajopt.solution import MARGIN, Solution
-from trajopt.timing.trajectory import State, Trajectory
+from trajopt.timing.states import State
+from trajopt.timing.trajectory import Trajectory
 
 _SAMPLES = 1200  # times at which curves are drawn, chosen: more than pixels across
 _BAND = 0.16  # opacity of the bands that mark the limit which binds, chosen
@@ -98,8 +101,8 @@ def _draw_steering(
     panels: Sequence[Axes], times: Array, state: State, wheels: dict[int, str]
 ) -> None:
     """Angles and rates of steered wheels and castors."""
-    for k, (i, name) in enumerate(wheels.items()):
-        look: dict[str, Any] = {"color": WHEEL_COLOURS[k % 8], "linestyle": WHEEL_DASHES[k % 4]}
+    for k, (i, name) in enumerate(list(wheels.items())[:MOST_LINES]):
+        look: dict[str, Any] = {"color": WHEEL_COLOURS[k % 8], "linestyle": WHEEL_DASHES[k % 8]}
         panels[0].plot(times, state.steering_angles[:, i], **look, label=name)
         panels[1].plot(times, state.steering_rates[:, i], **look)
     panels[0].set_ylabel("steering (rad)")
@@ -131,13 +134,14 @@ def _limit_lines(axes: Axes, value: float | None, label: str, *, both: bool) -> 
 
 
 def _draw_wheels(axes: Axes, times: Array, speeds: Array, solution: Solution) -> None:
-    for i, name in enumerate(solution.problem.robot.wheel_names):
+    names = solution.problem.robot.wheel_names
+    for i in telling(speeds):
         axes.plot(
             times,
             speeds[:, i],
             color=WHEEL_COLOURS[i % 8],
             linestyle=WHEEL_DASHES[i % 8],
-            label=name,
+            label=names[i],
         )
     axes.set_ylabel("wheel speed (rad/s)")
     section, limit = solution.problem.actuator, _wheel_limit(solution)
@@ -173,13 +177,14 @@ def _wheel_limit(solution: Solution) -> float | None:
 
 def _draw_use(axes: Axes, trajectory: Trajectory) -> None:
     times, used = limit_use(trajectory)
-    for k, limit in enumerate(trajectory.limits):
+    for k in telling(used):
+        name = trajectory.limits[k].name
         axes.plot(
             times[:, k],
             used[:, k],
-            color=limit_colour(limit.name, k),
+            color=limit_colour(name, k),
             linewidth=1.2,
-            label=_words(limit.name),
+            label=_words(name),
         )
     axes.axhline(1.0, color=GREY, linestyle="--", linewidth=1.0)
     axes.set_ylim(0.0, max(1.08, float(used.max()) * 1.05))

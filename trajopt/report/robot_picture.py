@@ -76,16 +76,13 @@ def robot_figure(
         f"{robot.name}: mobility {found.mobility}, steerability {found.steerability}, "
         f"manoeuvrability {found.manoeuvrability}"
     )
-    axes.set_xlabel("x forward, m")
-    axes.set_ylabel("y left, m")
+    axes.set_xlabel("x forward (m)")
+    axes.set_ylabel("y left (m)")
     return figure
 
 
 def save_robot_picture(robot: Robot, file: FilePath) -> FilePath:
-    """Write the robot from above as a PNG. Returns ``file``. Raises ArgumentError for another
-    kind."""
-    if file.suffix.lower() != ".png":
-        raise ArgumentError("--out", str(file), "a file that ends in .png")
+    """Write the robot from above, PNG, PDF or SVG. Returns ``file``. Raises ArgumentError for another kind."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with in_style():
         return save_figure(robot_figure(robot), file)

@@ -27,6 +27,7 @@ from trajopt.problem.ground import FILES
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import (
     FORMAT,
+    FORMATS,
     as_toml,
     made_folder,
     read_sealed,
@@ -38,6 +39,7 @@ from trajopt.report.files import (
 from trajopt.report.motion import (
     binding_shares,
     column,
+    sampled,
     timing_table,
     trajectory_table,
     turning_wheels,
@@ -45,13 +47,25 @@ from trajopt.report.motion import (
 )
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
+from trajopt.timing.cells import Measure
+from trajopt.timing.profile import Profile
+from trajopt.timing.track import Track
 from trajopt.timing.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
 
 
-_OF_A_CHECK = ("validation.json", "simulated.csv", "physics.png", "engine.png", "view.html")
+_OF_A_CHECK = (
+    "validation.json",
+    "simulated.csv",
+    "engine.png",
+    "view.html",
+    *(f"physics.{kind}" for kind in FORMATS),
+)
+_PICTURES = tuple(
+    f"{name}.{kind}" for name in ("path", "profile", "loads", "convergence") for kind in FORMATS
+)
 _OF_A_SOLUTION = (
     "summary.json",
     "problem.toml",
@@ -59,13 +73,14 @@ _OF_A_SOLUTION = (
     "timing.csv",
     "history.csv",
     "explored.npz",
-    "path.png",
-    "profile.png",
-    "loads.png",
-    "convergence.png",
+    *_PICTURES,
 )
+_SIGMA = ("sigma_dot_squared_m2_s2", "sigma_ddot_first_m_s2", "sigma_ddot_last_m_s2")
 _TABLES = {  # columns that are read back, and those of them that may hold gaps
-    "timing.csv": (("u", "s_m", "s_dot_m_s", "s_ddot_m_s2"), ("s_ddot_m_s2",)),
+    "timing.csv": (
+        ("u", "s_m", "s_dot_m_s", "s_ddot_m_s2", *_SIGMA),
+        ("s_ddot_m_s2", *_SIGMA),
+    ),
     "history.csv": (("evaluations", "cost", "violation", "seconds_s"), ("cost", "violation")),
 }
 
@@ -76,7 +91,7 @@ def write_solution(
     *,
     seed: int,
     command: str | None = None,
-    pictures: bool = False,
+    pictures: str | None = None,
 ) -> FilePath:
     """Write a solution into ``folder`` (made if needed; an earlier run's files are replaced) and
     return it.
@@ -84,7 +99,7 @@ def write_solution(
     ``summary.json`` comes last, so a folder with one is complete; it holds checksums of the others
     (but pictures) and of itself. Equal seeds and budgets in evaluations give equal bytes there
     outside the keys "run" and "checksum". Without a trajectory there is no trajectory.csv and
-    timing.csv. ``pictures`` draws them too. Raises ArgumentError where the folder cannot be
+    timing.csv. ``pictures`` is the format in which they are drawn too. Raises ArgumentError where the folder cannot be
     written, or holds files of these names that no run wrote.
     """
     place, search, problem = made_folder(folder), solution.search, solution.problem
@@ -115,7 +130,7 @@ def write_solution(
         from trajopt.report.pictures import save_pictures
         from trajopt.report.viewer.motion_page import write_view
 
-        save_pictures(solution, place)
+        save_pictures(solution, place, pictures)
         write_view(solution, place)
     summary = solution_summary(solution, seed=seed)
     summary["run"] = {
@@ -126,7 +141,7 @@ def write_solution(
         "wall_time_s": solution.wall_time,
         "search_time_s": None if search is None else search.seconds,
         "files": checksums(
-            place, [*(n for n in _OF_A_SOLUTION if not n.endswith(".png")), *names.values()]
+            place, [*(n for n in _OF_A_SOLUTION if n not in _PICTURES), *names.values()]
         ),
     }
     write_sealed(place / "summary.json", summary)
@@ -169,6 +184,9 @@ def solution_summary(solution: Solution, *, seed: int) -> dict[str, Any]:
             "engine": trajectory.engine,
             "gridpoints": len(trajectory.s),
             "slowdown": trajectory.slowdown,
+            "least_time_s": trajectory.bound,
+            "gap": trajectory.gap,
+            "sampled": sampled(trajectory),
             "limits": [limit.name for limit in trajectory.limits],
         },
         "search": _search_summary(solution, seed),
@@ -347,6 +365,11 @@ def _trajectory(
     known = {limit.name: limit for limit in problem.limits}
     if problem.profile is not None:
         known[problem.profile.bound.name] = problem.profile.bound
+    profile, square = None, table["sigma_dot_squared_m2_s2"]
+    if np.isfinite(square).all():
+        measure = Measure.of(Track(path, problem.robot, problem.scene.ground))
+        pulls = (table[name][:-1] for name in _SIGMA[1:])
+        profile = Profile(measure, table["u"], measure.sigma(table["u"]), square, *pulls)
     return Trajectory(
         path,
         tuple(known[name] for name in timing["limits"]),
@@ -360,6 +383,8 @@ def _trajectory(
         timing["slowdown"],
         problem.start_wheels,
         problem.start_steering,
+        profile,
+        timing["least_time_s"],
     )
 
 

@@ -14,10 +14,20 @@ from matplotlib.figure import Figure
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import FEASIBLE, OptimizeResult
 from trajopt.problem import Problem
+from trajopt.report.convergence_picture import log_where_wide, say_one_shot
 from trajopt.report.ground_plan import draw_robot, draw_scene, draw_space, frame_points, outline
 from trajopt.report.path_picture import path_figure
 from trajopt.report.robot_picture import robot_figure
-from trajopt.report.style import BLACK, BLUE, GREEN, GREY, VERMILION, in_style, new_figure
+from trajopt.report.style import (
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    VERMILION,
+    in_style,
+    new_figure,
+    plain_powers,
+)
 from trajopt.robots.mobility import mobility_of
 from trajopt.robots.robot import Robot
 from trajopt.simulate.check import ValidationReport
@@ -31,7 +41,7 @@ _DOTS = 90  # an inch, in a notebook; chosen
 def figure_of(thing: Any) -> Figure:
     """The picture of a result, in the style of all pictures. Raises ArgumentError for what has none."""
     with in_style():
-        return _figure(thing)
+        return plain_powers(_figure(thing))
 
 
 def html(thing: Any) -> str:
@@ -46,8 +56,7 @@ def html(thing: Any) -> str:
 def _image(thing: Any) -> str:
     buffer = io.BytesIO()
     try:
-        with in_style():
-            _figure(thing).savefig(buffer, format="png", dpi=_DOTS)
+        figure_of(thing).savefig(buffer, format="png", dpi=_DOTS)
     except ArgumentError:
         return ""  # there is nothing to draw, and the facts say so
     return f"<img src='data:image/png;base64,{base64.b64encode(buffer.getvalue()).decode()}'>"
@@ -119,13 +128,16 @@ def _(trajectory: Trajectory) -> dict[str, str]:
 @_figure.register
 def _(search: OptimizeResult) -> Figure:
     history, figure = search.history, new_figure(2.6)
-    axes, good = figure.add_subplot(), search.history.violation <= FEASIBLE
+    axes, good = figure.add_subplot(), history.violation <= FEASIBLE
     if not good.any():
         raise ArgumentError("search", search.message, "a search that met a feasible candidate")
     axes.step(
-        history.evaluations[good], history.cost[good], where="post", color=BLUE, marker="o", ms=3
-    )
-    axes.set_xlabel("evaluations of the objective")
+        [*history.evaluations[good], search.nfev], [*history.cost[good], history.cost[good][-1]],
+        where="post", color=BLUE, marker="o", ms=3,
+    )  # fmt: skip
+    log_where_wide(axes, history.cost[good])
+    say_one_shot(axes, search)
+    axes.set_xlabel("evaluations of the objective (–)")
     axes.set_ylabel("best cost so far (–)")
     axes.set_title(f"{search.optimizer}: {search.nfev} evaluations")
     return figure

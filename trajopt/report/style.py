@@ -11,17 +11,25 @@ from types import MappingProxyType
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogFormatter, NullFormatter
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
+from trajopt.report.files import FORMATS
 
 BLACK, GREY, LIGHT = "#000000", "#6b6b6b", "#c9c9c9"
 ORANGE, SKY, GREEN, YELLOW = "#E69F00", "#56B4E9", "#009E73", "#F0E442"
 BLUE, VERMILION, PURPLE = "#0072B2", "#D55E00", "#CC79A7"
 BROWN = "#a08060"  # chosen: contour lines
+
+MOST_LINES = 8  # of a plot, chosen: as many as colours that can be told apart
+LINE_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK, GREY)
 
 # Wheels in the order of every per-wheel array: colour tells left from right, the dash front from
 # rear, and further pairs from these.
@@ -51,7 +59,6 @@ LIMIT_COLOURS: Mapping[str, str] = MappingProxyType(
 )
 _SPARE = (YELLOW, SKY, GREEN, PURPLE)  # for limits that are not listed
 
-FORMATS = ("png", "pdf", "svg")
 RESOLUTION = 160  # dots an inch, chosen: sharp on a screen, 1100 pixels for a full-width figure
 WIDTH = 7.0  # inch, the text width of a report
 
@@ -82,6 +89,8 @@ _RC: Any = {
     "legend.frameon": False,
     "legend.handlelength": 2.0,
     "savefig.facecolor": "white",
+    "axes.prop_cycle": cycler(color=LINE_COLOURS),
+    "image.cmap": "viridis",
     "text.parse_math": False,  # titles and names are the user's: a "$" in them is one
 }
 
@@ -99,6 +108,26 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     return figure
 
 
+def plain_powers(figure: Figure) -> Figure:
+    """The figure with powers of ten in plain text on its logarithmic axes: mathematics is not parsed in its texts."""
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() == "log" and isinstance(axis.get_major_formatter(), LogFormatter):
+                low, high = sorted(axis.get_view_interval())
+                axis.set_major_formatter(FuncFormatter(_power))
+                axis.set_minor_formatter(
+                    NullFormatter() if high > 10.0 * low else FuncFormatter(_power)
+                )
+    return figure
+
+
+def _power(value: float, _: int | None) -> str:
+    power = round(np.log10(value)) if value > 0 else 0
+    if 1e-3 < value < 1e4 or not np.isclose(value, 10.0**power, rtol=1e-9, atol=0.0):
+        return f"{value:g}"
+    return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
 def save_figure(figure: Figure, file: FilePath) -> FilePath:
     """Write a picture, PNG, PDF or SVG by its suffix, whole or not at all. Returns ``file``.
 
@@ -107,9 +136,23 @@ def save_figure(figure: Figure, file: FilePath) -> FilePath:
     kind = file.suffix.lower().lstrip(".")
     if kind not in FORMATS:
         raise ArgumentError("file", str(file), "a name that ends in .png, .pdf or .svg")
+    plain_powers(figure)
     with whole_file(file) as part:
         figure.savefig(part, format=kind, dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
     return file
+
+
+def telling(values: Array, most: int = MOST_LINES) -> list[int]:
+    """Columns of (N, K) that reach furthest from 0, ``most`` at most, in their order; what is not finite does not
+    count."""
+    reach = np.nan_to_num(np.abs(values), nan=0.0, posinf=0.0).max(axis=0, initial=0.0)
+    return sorted(np.argsort(-reach, kind="stable")[:most].tolist())
+
+
+def first_in_front(axes: Axes) -> None:
+    """Lines that were drawn earlier lie over later ones: the subject comes first."""
+    for k, line in enumerate(axes.lines):
+        line.set_zorder(2.0 + 0.9 * (1.0 - k / len(axes.lines)))
 
 
 def limit_colour(name: str, index: int) -> str:

@@ -15,10 +15,20 @@ from trajopt.arrays import Array
 from trajopt.case import ProblemRun, run_case, seed_of, solve_case
 from trajopt.errors import ArgumentError
 from trajopt.files import file_name, whole_file
+from trajopt.paths.path import Path
+from trajopt.paths.spline import uniform_basis
 from trajopt.report.files import made_folder, write_json
 from trajopt.report.pictures import save_physics_picture, save_pictures
 from trajopt.report.run_folder import write_solution, write_validation
-from trajopt.report.style import in_style, legend_beside, new_figure, save_figure
+from trajopt.report.style import (
+    BLUE,
+    MOST_LINES,
+    VERMILION,
+    in_style,
+    legend_beside,
+    new_figure,
+    save_figure,
+)
 from trajopt.sweeps.cases import Case
 from trajopt.sweeps.rows import DONE
 
@@ -27,16 +37,21 @@ if TYPE_CHECKING:
     from trajopt.sweeps.sweepfile import SweepPlan
 
 _SAME = 1e-9  # relative; a case solved again must cost what its row says, on any processor. chosen
-_MOST_ARRAYS, _MOST_LINES = 8, 8  # panels of arrays.png and lines in one of them; chosen
+_MOST_ARRAYS = 8  # panels of arrays.png, chosen
+_SAMPLES = 200  # of a path that is drawn, chosen
 
 
 def report_case(
-    store: Store, prefix: str, folder: str | FilePath, plan: SweepPlan | None = None
+    store: Store,
+    prefix: str,
+    folder: str | FilePath,
+    plan: SweepPlan | None = None,
+    kind: str = "png",
 ) -> list[FilePath]:
     """Write what there is to see of the one case whose identity starts with ``prefix``; returns the
     files.
 
-    ``case.json`` and, for arrays beside the row, ``<name>.csv`` and ``arrays.png``. With ``plan``,
+    ``case.json`` and, for arrays beside the row, ``<name>.csv`` and ``arrays.png`` (pictures are of ``kind``). With ``plan``,
     a finished case of a problem file is solved again (the same seed, so the same result) and gets
     the run folder and the pictures of ``trajopt solve``, and of ``trajopt validate`` where its row
     was driven. Raises StoreError for a case that is not there, ArgumentError for a plan that is
@@ -48,7 +63,7 @@ def report_case(
     if plan is not None:
         case, run = _case(plan, str(row["case"])), plan.run
         if isinstance(run, ProblemRun) and run.func is run_case and row["status"] == DONE:
-            files += _solved_again(run, case, row, place)
+            files += _solved_again(run, case, row, place, kind)
     write_json(
         place / "case.json",
         {
@@ -64,16 +79,17 @@ def report_case(
             np.savetxt(part, table, delimiter=",", fmt="%.17g")
     if arrays:
         with in_style():
-            files.append(save_figure(arrays_figure(arrays), place / "arrays.png"))
+            figure = arrays_figure(arrays, searched=bool(row.get("search")))
+            files.append(save_figure(figure, place / f"arrays.{kind}"))
     return files
 
 
-def arrays_figure(arrays: Mapping[str, Array]) -> Figure:
+def arrays_figure(arrays: Mapping[str, Array], *, searched: bool = False) -> Figure:
     """Each array over its first index; over a column of times of the same length, where one is
     there.
 
-    An array whose name ends in "pose" or "points" is drawn in the plane, to scale. Raises
-    ArgumentError without arrays.
+    An array whose name ends in "pose" or "points" is drawn in the plane, to scale, points with the path through them
+    where they were ``searched`` for. Raises ArgumentError without arrays.
     """
     clocks = {len(a): a for n, a in arrays.items() if n.endswith("times") and a.ndim == 1}
     shown = [(n, a) for n, a in sorted(arrays.items()) if a.ndim and not n.endswith("times")][
@@ -87,32 +103,44 @@ def arrays_figure(arrays: Mapping[str, Array]) -> Figure:
     for axes, (name, array) in zip(
         figure.subplots(rows, columns, squeeze=False).ravel(), shown, strict=False
     ):
-        _draw(axes, name, array.reshape(len(array), -1), clocks.get(len(array)))
+        table = array.reshape(len(array), -1)
+        if name.endswith(("pose", "points")) and table.shape[1] >= 2:
+            _draw_plane(axes, name, table, searched=searched)
+        else:
+            _draw_columns(axes, table, clocks.get(len(array)))
+        axes.set_title(name)
     for axes in figure.axes[len(shown) :]:
         axes.set_visible(False)
     return figure
 
 
-def _draw(axes: Axes, name: str, table: Array, clock: Array | None) -> None:
-    axes.set_title(name)
-    if name.endswith(("pose", "points")) and table.shape[1] >= 2:
-        axes.plot(table[:, 0], table[:, 1], marker="o" if len(table) < 20 else None, markersize=3)
-        axes.set_xlabel("x (m)")
-        axes.set_ylabel("y (m)")
-        axes.set_aspect("equal", adjustable="datalim")
-        return
-    for number, column in enumerate(table.T[:_MOST_LINES]):
+def _draw_plane(axes: Axes, name: str, table: Array, *, searched: bool) -> None:
+    points = name.endswith("points")
+    if name == "control_points" and searched and len(table) > 2:
+        path = Path(uniform_basis(len(table)), table[:, :2], None)
+        line = path.position(np.linspace(path.start, path.end, _SAMPLES))
+        axes.plot(line[:, 0], line[:, 1], label="path")
+    look: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4} if points else {}
+    axes.plot(table[:, 0], table[:, 1], **look, color=VERMILION if points else BLUE)
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.set_aspect("equal", adjustable="datalim")
+
+
+def _draw_columns(axes: Axes, table: Array, clock: Array | None) -> None:
+    for number, column in enumerate(table.T[:MOST_LINES]):
         axes.plot(
             np.arange(len(table)) if clock is None else clock,
             column,
             label=str(number) if table.shape[1] > 1 else None,
         )
-    axes.set_xlabel("index" if clock is None else "time (s)")
+    axes.set_xlabel("index (–)" if clock is None else "time (s)")
+    axes.set_ylabel("value, as stored (–)")
     legend_beside(axes)
 
 
 def _solved_again(
-    run: ProblemRun, case: Case, row: Mapping[str, Any], place: FilePath
+    run: ProblemRun, case: Case, row: Mapping[str, Any], place: FilePath, kind: str
 ) -> list[FilePath]:
     """Run folder and pictures of a case that was solved."""
     solution, report = solve_case(case, run.changed(case))
@@ -124,10 +152,10 @@ def _solved_again(
             "code (see the store's runs/*.json)",
         )
     write_solution(solution, place, seed=seed_of(case), command="trajopt report")
-    files = [place / "summary.json", *save_pictures(solution, place)]
+    files = [place / "summary.json", *save_pictures(solution, place, kind)]
     if report is not None:
         write_validation(report, place, solution.problem.robot)
-        files += save_physics_picture(solution, report, place)
+        files += save_physics_picture(solution, report, place, kind)
     return files
 
 

@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
 from trajopt.report.intervals import wilson
+from trajopt.report.style import GREY, MOST_LINES, first_in_front, in_style, new_figure, save_figure
+from trajopt.report.units import with_unit
 from trajopt.sweeps.store import open_store
 
-DOTS = 150  # dots per inch of saved pictures
 INTERVAL = (10.0, 90.0)  # percentiles between which a line's band lies; chosen
 _MOST_PAIRS = 6  # columns of a picture of pairs, to stay readable; chosen
 _MOST_POINTS = 5_000  # points drawn in one panel of pairs; chosen
@@ -32,18 +31,15 @@ def heat_map(frame: pd.DataFrame, x: str, y: str, value: str) -> Figure:
     means = rows.assign(**{value: rows[value].astype(float)}).pivot_table(
         index=y, columns=x, values=value
     )
-    figure = Figure(
-        figsize=(1.6 + 0.75 * len(means.columns), 1.4 + 0.45 * len(means.index)),
-        layout="constrained",
-    )
-    FigureCanvasAgg(figure)
+    figure = new_figure(1.4 + 0.45 * len(means.index), 1.6 + 0.75 * len(means.columns))
     axes = figure.add_subplot()
     cells = means.to_numpy(dtype=np.float64)
-    image = axes.imshow(cells, origin="lower", aspect="auto", cmap="viridis")
+    image = axes.imshow(cells, origin="lower", aspect="auto")
+    axes.grid(visible=False)
     axes.set_xticks(range(len(means.columns)), [_short(v) for v in means.columns])
     axes.set_yticks(range(len(means.index)), [_short(v) for v in means.index])
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    axes.set_xlabel(with_unit(x))
+    axes.set_ylabel(with_unit(y))
     middle = (np.nanmin(cells) + np.nanmax(cells)) / 2
     if cells.size <= 400:
         for (row, column), cell in np.ndenumerate(cells):
@@ -57,39 +53,43 @@ def heat_map(frame: pd.DataFrame, x: str, y: str, value: str) -> Figure:
                     fontsize=8,
                     color="black" if cell > middle else "white",
                 )
-    figure.colorbar(image, label=f"mean {value}")
+    figure.colorbar(image, label=f"mean {with_unit(value)}")
     return figure
 
 
 def lines(frame: pd.DataFrame, x: str, value: str, by: str | None = None) -> Figure:
     """Median of ``value`` over ``x``, a line for each value of ``by``, with bands from the 10th to
     the 90th percentile; for a value that is only 0 or 1 (or a boolean) the share of ones with
-    Wilson's 95 % interval.
+    Wilson's 95 % interval. Of more than 8 values of ``by`` as many are drawn, evenly out of all.
 
     Finished cases only. Raises ArgumentError as ``heat_map``.
     """
     rows = _done(frame, (x, value) if by is None else (x, value, by))
     rows = rows.assign(**{value: rows[value].astype(float)})
     yes_or_no = bool(rows[value].isin([0.0, 1.0]).all())
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(4.2)
     axes = figure.add_subplot()
-    for name, group in [("", rows)] if by is None else list(rows.groupby(by)):
+    groups = [("", rows)] if by is None else list(rows.groupby(by))
+    places_of = np.linspace(0, len(groups) - 1, min(len(groups), MOST_LINES)).round().astype(int)
+    for name, group in (groups[k] for k in places_of):
         bands = [
             (place, *(_share(v) if yes_or_no else _median(v)))
             for place, v in group.groupby(x)[value]
         ]
         places, middle, low, high = zip(*bands, strict=True)
-        label = None if by is None else f"{by} = {_short(name)}"
+        label = None if by is None else _short(name)
         (line,) = axes.plot(places, middle, marker="o", markersize=4, label=label)
         axes.fill_between(places, low, high, color=line.get_color(), alpha=0.18, linewidth=0)
-    axes.set_xlabel(x)
+    first_in_front(axes)
+    axes.set_xlabel(with_unit(x))
     axes.set_ylabel(
-        f"{value} (share, 95 % interval)" if yes_or_no else f"{value} (median, 10-90 %)"
+        f"{value} (–): share, 95 % interval"
+        if yes_or_no
+        else f"{with_unit(value)}: median, 10-90 %"
     )
-    axes.grid(alpha=0.3)
     if by is not None:
-        axes.legend()
+        left = len(groups) - len(places_of)
+        axes.legend(title=with_unit(by) + (f", {left} values between left out" if left else ""))
     return figure
 
 
@@ -111,19 +111,21 @@ def pairs(frame: pd.DataFrame, columns: Sequence[str]) -> Figure:
     values = rows[list(columns)].astype(float).to_numpy()
     values = values[:: max(1, len(values) // _MOST_POINTS)]
     count = len(columns)
-    figure = Figure(figsize=(2.0 * count + 0.8, 2.0 * count + 0.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    grid = figure.subplots(count, count, squeeze=False)
+    figure = new_figure(2.0 * count + 0.5, 2.0 * count + 0.8)
+    grid = figure.subplots(count, count, squeeze=False, sharex="col")
     for (i, j), axes in np.ndenumerate(grid):
         if i == j:
-            axes.hist(values[:, i], bins=30, color="0.6")
+            axes.hist(values[:, i], bins=30, color=GREY)
         else:
             axes.plot(values[:, j], values[:, i], ".", markersize=2, alpha=0.5)
-        axes.tick_params(labelsize=7)
         if i == count - 1:
-            axes.set_xlabel(columns[j], fontsize=8)
-        if j == 0:
-            axes.set_ylabel(columns[i], fontsize=8)
+            axes.set_xlabel(with_unit(columns[j]))
+        if i == j:
+            axes.set_ylabel("cases (–)")
+        elif j == 0:
+            axes.set_ylabel(with_unit(columns[i]))
+        else:
+            axes.tick_params(labelleft=False)
     return figure
 
 
@@ -137,24 +139,24 @@ def draw(
     by: str = "",
     pair: Sequence[str] | None = None,
 ) -> None:
-    """Save a picture of a sweep's store: x, y and value (heat map), x and value (lines), or pairs
+    """Save a picture (*.png, *.pdf, *.svg) of a sweep's store: x, y and value (heat map), x and value (lines), or pairs
     of columns.
 
     Raises ArgumentError for any other choice of columns.
     """
     frame = open_store(store, create=False).frame()
-    if pair:
-        figure = pairs(frame, pair)
-    elif x and y and value:
-        figure = heat_map(frame, x, y, value)
-    elif x and value:
-        figure = lines(frame, x, value, by or None)
-    else:
-        raise ArgumentError(
-            "options", None, "--x --y --value, --x --value [--by], or --pair twice or more"
-        )
-    with whole_file(out) as part:
-        figure.savefig(part, dpi=DOTS)
+    with in_style():
+        if pair:
+            figure = pairs(frame, pair)
+        elif x and y and value:
+            figure = heat_map(frame, x, y, value)
+        elif x and value:
+            figure = lines(frame, x, value, by or None)
+        else:
+            raise ArgumentError(
+                "options", None, "--x --y --value, --x --value [--by], or --pair twice or more"
+            )
+        save_figure(figure, out)
 
 
 def _done(frame: pd.DataFrame, columns: Sequence[str]) -> pd.DataFrame:

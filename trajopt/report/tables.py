@@ -9,7 +9,13 @@ from rich import box
 from rich.table import Table
 
 from trajopt.optimize.base import OptimizeResult
-from trajopt.report.motion import binding_shares, turning_wheels
+from trajopt.report.motion import (
+    MOST_ROWS,
+    SAMPLE_TIME,
+    binding_shares,
+    sampled,
+    turning_wheels,
+)
 from trajopt.report.words import words
 from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
@@ -29,6 +35,8 @@ def solution_table(solution: Solution) -> Table:
     table.add_row(
         "duration", "none" if solution.trajectory is None else f"{solution.duration:.4f} s"
     )
+    if solution.trajectory is not None and solution.duration > SAMPLE_TIME * MOST_ROWS:
+        table.add_row("trajectory.csv", sampled(solution.trajectory))
     if np.isfinite(solution.energy):
         table.add_row("work of the motors", f"{solution.energy:.4g} J")
     _margin_rows(table, solution)

@@ -24,6 +24,7 @@ from trajopt.timing.trajectory import Trajectory
 from trajopt.world.scene import Scene
 from trajopt.world.terrain import Flat
 
+LONGEST = 2000.0  # s; chosen: a million commands and records
 FASTER = 1.2  # than the fastest planned wheel, times: what feedback may ask of wheels; chosen
 LOADED = 0.02  # of the weight, below which a wheel's slip does not count; chosen
 SLIP_TIME = 0.05  # s over which slip is averaged: contacts of rollers chatter; chosen
@@ -125,6 +126,9 @@ def validate(
     robot = _driven_robot(trajectory, scene)
     if seed < 0:
         raise ArgumentError("seed", seed, "a whole number >= 0")
+    if trajectory.duration > LONGEST:
+        expected = f"a motion of at most {LONGEST:g} s, to drive it in real steps"
+        raise ArgumentError("trajectory", f"{trajectory.duration:.6g} s", expected)
     first = trajectory.at(0.0).pose[0]
     pose = first if start is None else np.asarray(start, dtype=np.float64)
     camera, area = Camera() if picture else None, area_of(trajectory, pose)

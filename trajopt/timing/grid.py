@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, BoolArray, as_numbers, require_whole
-from trajopt.errors import ArgumentError
+from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.path import Path
+from trajopt.timing.cells import Measure
 
 _CELLS = (
     400  # intervals on a path when the caller does not say; chosen: refinement adds what is missing
@@ -19,6 +20,8 @@ _CELLS = (
 _CELLS_PER_SEGMENT = 20  # at least this many on a spline segment; chosen
 _MOST = 1_000_000  # gridpoints that a caller may ask for; chosen
 MOST_REFINED = 100_000  # gridpoints that refinement may make: half a gigabyte of rows; chosen
+_MOST_CELLS = 60_000  # for memory; chosen
+_CLOSE = 1e-6  # of a cell: gridpoints closer than that are one; chosen
 _MERGE = 1e-12  # gridpoints closer than this share of the path's length are one
 
 
@@ -47,6 +50,49 @@ def initial_grid(path: Path, gridpoints: int | ArrayLike | None) -> Array:
         a + h * np.arange(1, int(n)) / n for a, h, n in zip(s0[:-1], spans, cells, strict=True)
     ]
     return insert(path, knots, np.concatenate(steps))
+
+
+def graded_grid(measure: Measure, gridpoints: int | ArrayLike | None) -> Array:
+    """As ``initial_grid``, with gridpoints where the motion varies: by arc length, turning, and
+    change of the twist."""
+    path = measure.path
+    if not (gridpoints is None or isinstance(gridpoints, (int, np.integer))):
+        return initial_grid(path, gridpoints)
+    if gridpoints is not None and gridpoints < 2:
+        raise ArgumentError("gridpoints", gridpoints, "2 or more gridpoints")
+    from trajopt.timing import spread
+
+    free = path.heading is not None
+    left, sigma, weight, segment = spread.base_cells(*measure.cubics, measure.size, free)
+    if len(left) >= spread.MOST_CELLS:
+        raise InfeasibleError(
+            "path",
+            float(path.parameter(left[-1:])[0]),
+            "the path has turned tens of thousands of times by here; move its points or headings",
+        )
+    share = sigma / sigma.sum() + weight
+    wanted = min(_CELLS * max(1.0, share.sum() / 4), _MOST_CELLS)
+    cells = wanted if gridpoints is None else gridpoints - 1.0
+    least = 2 if gridpoints is None else 1
+    knots = measure.cubics[0]
+    u = spread.spread(knots, left, share, segment, float(cells), least)
+    return np.asarray(u[np.concatenate([[True], np.diff(u) > 0])])
+
+
+def placed(u: Array, wanted: Array, knots: Array) -> tuple[Array, Array]:
+    """Grid u with gridpoints at spline parameters ``wanted``, and where these are now: on a knot
+    next to them, or exactly there, in place of a gridpoint that is much closer than a cell."""
+    found = np.array(wanted, dtype=np.float64)
+    for n, place in enumerate(found):
+        i = int(np.clip(np.searchsorted(u, place), 1, len(u) - 1))
+        near = i if u[i] - place < place - u[i - 1] else i - 1
+        if abs(u[near] - place) > _CLOSE * (u[i] - u[i - 1]):
+            u = np.insert(u, i, place)
+        elif u[near] in knots:
+            found[n] = u[near]
+        else:
+            u[near] = place
+    return u, found
 
 
 def insert(path: Path, u: Array, places: Array) -> Array:

@@ -9,18 +9,21 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, as_numbers, require_not_negative
+from trajopt.arrays import Array, as_numbers, require_not_negative, require_positive
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit, is_linear
 from trajopt.paths.path import Path
 from trajopt.paths.samples import require_moving
 from trajopt.robots.robot import Robot
+from trajopt.timing.cells import Measure, Readable
 from trajopt.timing.compiled import forward_profile
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
+from trajopt.timing.fastest import Ask, Stuck, fastest
 from trajopt.timing.feasibility import require_motion
-from trajopt.timing.grid import MOST_REFINED, initial_grid, insert, split
+from trajopt.timing.grid import MOST_REFINED, graded_grid, initial_grid, insert, placed, split
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
+from trajopt.timing.planar import source_of
 from trajopt.timing.rests import AT, with_rests
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
@@ -35,6 +38,7 @@ REFINE_ABOVE = (
 REFINE_ROUNDS = 4  # rounds spent on that; chosen
 MOST_ROUNDS = 16  # rounds before giving up on a violation above the largest slow-down; chosen
 LARGEST_SLOWDOWN = 1.001  # of time; chosen
+_TRIALS = 3  # grids where a motion exists but is not found; chosen
 _KEPT = 1e-9  # relative violation that counts as none
 _TIGHTER = (
     0.0,
@@ -76,6 +80,7 @@ def time_scale(
     too_fast: Literal["refuse", "brake"] = "refuse",
     start_wheels: ArrayLike = (),
     start_steering: Mapping[str, float] | None = None,
+    gap: float | None = 1e-3,
 ) -> Trajectory:
     """Fastest motion along ``path`` within ``limits``, from ``start_speed`` to ``end_speed`` (s',
     m/s).
@@ -84,9 +89,12 @@ def time_scale(
     parameters are arc lengths in space); a path in space must lie on it. Without ground, or with
     ``Flat``, the path itself is the ground, level across its direction.
 
-    ``engine``: "auto" takes the fastest that is exact for the rows at hand: "bounds" (the fast
-    pass, where only s' and s'' are bounded), else "compiled" (numba), else "toppra". Two more are
-    slower motions: "linear" ([waheed2006]: one factor for the whole motion, uniform in the spline
+    ``engine``: "auto" and "compiled" are of second order: s'' is linear between gridpoints, which lie
+    where the motion varies. The motion is checked inside every cell, and a lower bound on the time of
+    any motion that keeps the limits stands beside it: the grid is refined until both are within
+    ``gap`` of the duration, if that can be reached (``Trajectory.gap`` tells; None: no bound is made).
+    "bounds" (only where s' and s'' alone are bounded) and "toppra" hold s'' constant between evenly
+    spread gridpoints. Two more are slower motions: "linear" ([waheed2006]: one factor for the whole motion, uniform in the spline
     parameter, with the end speeds that the path gives it, so start and end speed must stay 0) and
     "segments" (below the speed of a factor for each spline segment). ``gridpoints``: how many, or
     path parameters (m); more are added where limits are broken between them. ``stops``: path
@@ -111,6 +119,14 @@ def time_scale(
     """
     speeds, start = (start_speed, end_speed), (start_wheels, start_steering)
     job = _job(path, limits, robot, ground, speeds, engine, stops, start)
+    if gap is not None:
+        require_positive("gap", gap, "(a share of the duration), or None")
+    if too_fast not in ("refuse", "brake"):
+        raise ArgumentError("too_fast", too_fast, "refuse or brake")
+    second_order = engine in ("auto", "compiled") and all(map(is_linear, job.limits))
+    if second_order and not job.track.steers and too_fast == "refuse" and _drives_anywhere(job):
+        require_moving(job.path)
+        return _second_order(job, speeds, gridpoints, gap, np.zeros(0))
     u = insert(job.path, initial_grid(job.path, gridpoints), job.stops)
     rests = job.stops if start_speed > 0 or engine == "linear" else np.append(job.stops, 0.0)
     job = replace(job, track=with_rests(job.track, job.limits, u, rests))
@@ -124,10 +140,12 @@ def time_scale(
                 job.start,
             ),
         )
-    elif too_fast not in ("refuse", "brake"):
-        raise ArgumentError("too_fast", too_fast, "refuse or brake")
     if engine == "linear":
         return _linear(job, fine_rows(job.track, u, job.limits))
+    if second_order:
+        return _second_order(
+            job, speeds, gridpoints, gap, u if job.limits != tuple(limits) else u[:0]
+        )
     for tighter in _TIGHTER:
         fine, sd2, worst, name = _refined(job, u, tighter)
         factor = max(1.0, worst)
@@ -141,6 +159,64 @@ def time_scale(
         f"it is broken by {-slack.min():.2g} of "
         "its size, and slowing down does not help (rest breaks it, or nearly)",
     )
+
+
+def _second_order(
+    job: _Job,
+    speeds: tuple[float, float],
+    gridpoints: int | ArrayLike | None,
+    gap: float | None,
+    also: Array,
+) -> Trajectory:
+    """The fastest motion on a graded grid, with gridpoints ``also`` (spline parameters)."""
+    path, along = job.path, job.track
+    measure = Measure.of(along)
+    knots = np.asarray(path.basis.knots)
+    source = source_of(along, measure, job.limits)
+    u, edges = graded_grid(measure, gridpoints), np.zeros(0)
+    if isinstance(source, Readable):  # limits may have places where they jump
+        edges = np.asarray(source.edges(along, u), dtype=np.float64)
+    edges = edges[(edges > 0) & (edges < path.length)]
+    wanted = np.concatenate([path.locate(np.append(job.stops, edges)), along.rests, also])
+    u, kept = placed(u, wanted, knots)
+    ask = Ask(along, job.limits, *speeds, kept[: len(job.stops)], gap)
+    jumps = np.concatenate([knots, kept])
+    for done in range(_TRIALS):
+        try:
+            found = fastest(ask, source, u, jumps)
+            break
+        except Stuck:
+            _refuse(job, insert(path, initial_grid(path, gridpoints), job.stops))
+            if done == _TRIALS - 1:
+                raise InfeasibleError(
+                    job.limits[0].name, 0.0, "no profile was found on any grid"
+                ) from None
+            u = np.sort(np.concatenate([u, (u[:-1] + u[1:]) / 2]))
+    profile = found.profile
+    s = path.parameter(profile.u)
+    g, _ = measure.stretch(profile.u)
+    sd = np.sqrt(profile.y) / g
+    return Trajectory(
+        path,
+        job.limits,
+        along.robot,
+        along.ground,
+        profile.u,
+        s,
+        sd,
+        np.diff(sd**2) / (2 * np.maximum(np.diff(s), 1e-300)),
+        "compiled",
+        found.slowdown,
+        job.start_wheels,
+        along.start_steering,
+        profile,
+        found.bound,
+    )
+
+
+def _refuse(job: _Job, u: Array) -> None:
+    """Raises InfeasibleError with the limit that forbids every motion on the grid u, and where."""
+    _fastest(job, _with_edges(job, u), 0.0)
 
 
 def rough_duration(
@@ -211,6 +287,18 @@ def _job(
     wheels = as_numbers("start_wheels", start[0], "wheel angles, rad")
     squares = speeds[0] ** 2, speeds[1] ** 2
     return _Job(along, tuple(limits), *squares, places, engine, wheels)
+
+
+def _drives_anywhere(job: _Job) -> bool:
+    """Whether the robot's wheels allow every twist of a path of this kind, on level ground."""
+    if not (job.track.ground.level and job.path.plain):
+        return False
+    robot = job.track.robot
+    if robot is None:
+        return True
+    free = robot.drivable
+    needed = np.eye(3) if job.path.heading is not None else np.eye(3)[[0, 2]]
+    return bool(np.allclose(needed @ free @ free.T, needed, atol=1e-9))
 
 
 def _require_drivable(job: _Job, u: Array) -> None:

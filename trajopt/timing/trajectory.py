@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, IndexArray, as_numbers
+from trajopt.arrays import Array, BoolArray, IndexArray, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
-from trajopt.robots.steering import steering_of
 from trajopt.shown import Shown
 from trajopt.timing.energy import energies
+from trajopt.timing.profile import Profile, margins_of
 from trajopt.timing.rests import Rest, rests_of
-from trajopt.timing.stages import Check, check, fine_rows
+from trajopt.timing.stages import check, fine_rows
+from trajopt.timing.states import Course, State, states_at
 from trajopt.timing.track import Track
 from trajopt.world.ground import Ground
 
@@ -28,6 +29,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _BINDS = 2e-3  # relative margin below which a limit counts as binding; above the largest slow-down (0.1 %)
+_AS_TIGHT = (
+    1e-4  # relative margin within which limits bind alike; chosen: above what tightening leaves
+)
 _ON_TIME = 1e-12  # share of the duration by which a time may lie outside through rounding
 
 
@@ -37,25 +41,6 @@ class Stretch(NamedTuple):
     start: float
     end: float
     limit: str
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Robot state at N times. Poses are (x, y, yaw) in the world, twists (vx, vy, wz) in the body
-    frame, which stands on the ground."""
-
-    pose: Array  # (N, 3) m, m, rad (yaw continuous along the path)
-    twist: Array  # (N, 3) m/s, m/s, rad/s
-    wheel_angles: Array  # (N, W) rad, from the trajectory's start_wheels; W = 0 without a robot
-    wheel_speeds: Array  # (N, W) rad/s
-    position: Array  # (N, 3) of the body's origin in the world, m
-    rotation: Array  # (N, 3, 3): columns are the body's axes in the world
-    spin_angles: Array  # (N, K) rad, of all wheels of the robot's file; those of W are wheel_angles
-    spin_rates: Array  # (N, K) rad/s
-    steering_angles: (
-        Array  # (N, K) rad, of castors and steered wheels from the file's angle, else 0
-    )
-    steering_rates: Array  # (N, K) rad/s
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -79,6 +64,8 @@ class Trajectory(Shown):
     slowdown: float
     start_wheels: Array = field(default_factory=lambda: np.zeros(0))  # (W,) rad; () means zeros
     start_steering: Mapping[str, float] = field(default_factory=dict)  # rad, see ``time_scale``
+    profile: Profile | None = None  # in the cells, where s'' is not constant there
+    bound: float | None = None  # s, which no motion that keeps the limits beats; None: unknown
 
     def __post_init__(self) -> None:
         count = 0 if self.robot is None else len(self.robot.wheels)
@@ -93,8 +80,8 @@ class Trajectory(Shown):
         return f"Trajectory({robot}, {self.duration:.4g} s over {self.path.length:.4g} m)"
 
     def to_frame(self) -> pd.DataFrame:
-        """The motion in steps of at most 10 ms, the columns of ``trajectory.csv``; units in the
-        names."""
+        """The motion in steps of at most 10 ms (in all at most some 20,000, then by cells of the
+        profile), the columns of ``trajectory.csv``; units in the names."""
         import pandas
 
         from trajopt.report.motion import trajectory_table
@@ -104,10 +91,11 @@ class Trajectory(Shown):
     @cached_property
     def times(self) -> Array:
         """(N+1,): times at which the robot leaves the gridpoints, s."""
-        moving = np.concatenate(
-            [[0.0], np.cumsum(2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:]))]
-        )
-        return np.asarray(moving + np.cumsum(self.waits))
+        if self.profile is None:
+            seconds = 2 * np.diff(self.s) / (self.sd[:-1] + self.sd[1:])
+        else:
+            seconds = self.profile.seconds
+        return np.asarray(np.concatenate([[0.0], np.cumsum(seconds)]) + np.cumsum(self.waits))
 
     @cached_property
     def rests(self) -> tuple[Rest, ...]:
@@ -120,12 +108,12 @@ class Trajectory(Shown):
     def waits(self) -> Array:
         """(N+1,): how long the robot rests at the gridpoints, s, while wheels turn."""
         found = np.zeros(len(self.u))
-        for node, rest in self._resting.items():
+        for node, rest in self.resting.items():
             found[node] = rest.duration
         return found
 
     @cached_property
-    def _resting(self) -> dict[int, Rest]:
+    def resting(self) -> dict[int, Rest]:
         """The rests by gridpoint."""
         return {int(np.argmin(np.abs(self.u - rest.u))): rest for rest in self.rests}
 
@@ -146,24 +134,46 @@ class Trajectory(Shown):
         robot's file. Raises ArgumentError for robots whose torques are not known."""
         return float(self.energies[-1])
 
+    @property
+    def gap(self) -> float | None:
+        """How far the duration can be from the least possible, at most, as a share of it; None
+        where no bound was asked for."""
+        return None if self.bound is None else max(0.0, 1.0 - self.bound / self.duration)
+
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,
         duration]."""
-        i, after, node, _ = self._placed(t)
-        s = self.s[i] + after * (self.sd[i] + after * self.sdd[i] / 2)
-        speed = np.maximum(self.sd[i] + self.sdd[i] * after, 0.0)
-        waits = node >= 0
-        speed, sdd = np.where(waits, 0.0, speed), np.where(waits, 0.0, self.sdd[i])
-        return np.clip(s, self.s[i], self.s[i + 1]), speed, sdd
+        i, after, node, _ = self.placed(t)
+        _, s, speed, sdd = self.moving(i, after, node >= 0)
+        return s, speed, sdd
 
-    def _placed(self, t: ArrayLike) -> tuple[IndexArray, Array, IndexArray, Array]:
+    def moving(
+        self, i: IndexArray, after: Array, waits: BoolArray
+    ) -> tuple[Array, Array, Array, Array]:
+        """(N,) each: spline parameter, s, s' and s'' so long after intervals were entered."""
+        if self.profile is not None:
+            u, speed, pull = self.profile.along(i, after)
+            g, slope = self.profile.measure.stretch(u)
+            speed = speed / g
+            s, sdd = self.path.parameter(u), (pull - slope * speed**2) / g
+        else:
+            s = self.s[i] + after * (self.sd[i] + after * self.sdd[i] / 2)
+            s = np.clip(s, self.s[i], self.s[i + 1])
+            u, sdd = self.path.locate(s), self.sdd[i]
+            speed = np.maximum(self.sd[i] + sdd * after, 0.0)
+        return u, s, np.where(waits, 0.0, speed), np.where(waits, 0.0, sdd)
+
+    def inside(self, share: float) -> tuple[Array, Array, Array, Array]:
+        """(N,) each: spline parameter, s (m), s' and s'' in every interval, a ``share`` of the time
+        that it takes after it was entered."""
+        moving = np.diff(self.times) - self.waits[1:]
+        return self.moving(np.arange(len(moving)), share * moving, np.zeros(len(moving), bool))
+
+    def placed(self, t: ArrayLike) -> tuple[IndexArray, Array, IndexArray, Array]:
         """At times t (N,): which interval between gridpoints and the time since it was entered; the
         gridpoint at which the robot waits, -1 while it moves, and the time since it came to rest
         there."""
-        time = np.atleast_1d(as_numbers("t", t, f"times in [0, {self.duration!r}] s"))
-        slack = _ON_TIME * self.duration
-        if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
-            raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
+        time = self.within(t)
         i = np.clip(np.searchsorted(self.times, time, side="right") - 1, 0, len(self.sdd) - 1)
         moving = self.times[i + 1] - self.waits[i + 1] - self.times[i]
         after = np.clip(time - self.times[i], 0.0, moving)
@@ -172,45 +182,23 @@ class Trajectory(Shown):
         waits = (self.waits[node] > 0) & (since >= 0)
         return i, after, np.where(waits, node, -1), since
 
+    def within(self, t: ArrayLike) -> Array:
+        """(N,): times t, s. Raises ArgumentError outside [0, duration]."""
+        time = np.atleast_1d(as_numbers("t", t, f"times in [0, {self.duration!r}] s"))
+        slack = _ON_TIME * self.duration
+        if time.ndim != 1 or not np.all((time >= -slack) & (time <= self.duration + slack)):
+            raise ArgumentError("t", np.asarray(t).tolist(), f"times in [0, {self.duration!r}] s")
+        return time
+
     def at(self, t: ArrayLike) -> State:
         """State at times t (N,) or one time (N = 1), s. Raises ArgumentError outside [0,
         duration]."""
-        (i, _, node, since), (s, speed, _) = self._placed(t), self.along(t)
-        inside = np.where(i + 2 < len(self.u), np.nextafter(self.u[i + 1], -np.inf), self.u[-1])
-        u = np.clip(self.path.locate(s), self.u[i], inside)
-        u = np.where(node >= 0, self.u[node], u)
-        samples = self.track.samples(s, u)
-        table_u, table_yaw = self._yaw_table
-        turns = np.round((np.interp(u, table_u, table_yaw) - samples.yaw) / (2 * np.pi))
-        pose = np.column_stack([samples.position[:, :2], samples.yaw + 2 * np.pi * turns])
-        twist = samples.twist * speed[:, None]
-        place = (samples.position, samples.rotation)
-        if self.robot is None or samples.wheels is None:
-            none = np.zeros((len(s), 0))
-            return State(pose, twist, none, none, *place, none, none, none, none)
-        rolling, wheels = steering_of(self.robot).rolling, samples.wheels
-        angles, rates = self.track.wheels.at(u), wheels.spin * speed[:, None]
-        angles[:, rolling] += self.start_wheels
-        turned, turning = wheels.steering.copy(), wheels.steering_rate * speed[:, None]
-        for gridpoint, rest in self._resting.items():
-            ahead, turning[node == gridpoint] = rest.ahead(since[node == gridpoint])
-            turned[node == gridpoint] -= ahead
-        return State(
-            pose,
-            twist,
-            angles[:, rolling],
-            rates[:, rolling],
-            *place,
-            angles,
-            rates,
-            turned,
-            turning,
-        )
+        return states_at(self, t)
 
     def margins(self) -> Mapping[str, float]:
-        """Least relative margin of every limit, recomputed on a grid ten times finer than the
-        solver's."""
-        least = self._check.slack.min(axis=0)
+        """Least relative margin of every limit, recomputed at the ends and quarters of the cells,
+        which are small where the motion varies (or on a grid ten times finer than the solver's)."""
+        least = self._slack.min(axis=0)
         return MappingProxyType(
             {limit.name: float(m) for limit, m in zip(self.limits, least, strict=True)}
         )
@@ -219,10 +207,12 @@ class Trajectory(Shown):
     def binding(self) -> tuple[str, ...]:
         """(N,): name of the limit that binds in each interval between gridpoints, "" where none
         does."""
-        slack = self._check.slack
-        least = np.argmin(slack, axis=1)
-        tight = slack[np.arange(len(slack)), least] < _BINDS
-        return tuple(self.limits[k].name if t else "" for k, t in zip(least, tight, strict=True))
+        slack = self._slack
+        tight = (slack < _BINDS) & (slack < slack.min(axis=1, keepdims=True) + _AS_TIGHT)
+        # Of several, the one that binds at the fewest places: that it does is said nowhere else.
+        rare = np.argmin(np.where(tight, tight.sum(axis=0), np.iinfo(np.int64).max), axis=1)
+        some = tight.any(axis=1)
+        return tuple(self.limits[k].name if t else "" for k, t in zip(rare, some, strict=True))
 
     @cached_property
     def active(self) -> tuple[Stretch, ...]:
@@ -238,8 +228,11 @@ class Trajectory(Shown):
         )
 
     @cached_property
-    def _check(self) -> Check:
-        return check(fine_rows(self.track, self.u, self.limits, self.sd**2), self.sd**2)
+    def _slack(self) -> Array:
+        """(N, L): least relative margin of every limit in each interval."""
+        if self.profile is not None:
+            return margins_of(self.track, self.profile, self.limits)
+        return check(fine_rows(self.track, self.u, self.limits, self.sd**2), self.sd**2).slack
 
     @cached_property
     def track(self) -> Track:
@@ -248,7 +241,6 @@ class Trajectory(Shown):
         return Track(self.path, self.robot, self.ground, self.start_steering, rests)
 
     @cached_property
-    def _yaw_table(self) -> tuple[Array, Array]:
-        """Continuous yaw at spline parameters close enough to tell the turn."""
-        u = np.linspace(self.path.start, self.path.end, 256 * (len(self.path.basis.knots) - 1) + 1)
-        return u, self.path.yaw(u)
+    def course(self) -> Course:
+        """What ``at`` needs once."""
+        return Course(self)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Turning:
     u: Array
     steered: Array
     turns: tuple[Turn, ...] = ()
+    castor_u: Array = field(default_factory=lambda: np.zeros(0))  # (M,) spline parameters of s
 
     def at(self, samples: PathSamples, bend: Array | None) -> Array:
         """(N, K): steering angles of all wheels, rad, at samples and the second derivative of their
@@ -51,21 +53,23 @@ class Turning:
         return found
 
     def _castors(self, s: Array) -> Array:
-        """Quintic Hermite interpolation."""
         i = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
-        h = (self.s[i + 1] - self.s[i])[:, None]
-        t = (s - self.s[i])[:, None] / h
-        y0, y1 = self.castor[i], self.castor[i + 1]
-        d0, d1 = (self.castor_rate[i, k] * h for k in (0, 1))
-        c0, c1 = (self.castor_bend[i, k] * h**2 / 2 for k in (0, 1))
+        t, a = ((s - self.s[i]) / (self.s[i + 1] - self.s[i]))[:, None], self.castor_powers[:, i]
+        return np.asarray(a[0] + t * (a[1] + t * (a[2] + t * (a[3] + t * (a[4] + t * a[5])))))
+
+    @cached_property
+    def castor_powers(self) -> Array:
+        """(6, M-1, C): coefficients of 1, t, .. t^5 of quintic Hermite interpolation in the cells, t
+        from 0 to 1."""
+        h = np.diff(self.s)[:, None]
+        y0, y1 = self.castor[:-1], self.castor[1:]
+        d0, d1 = (self.castor_rate[:, k] * h for k in (0, 1))
+        c0, c1 = (self.castor_bend[:, k] * h**2 / 2 for k in (0, 1))
         rest = y1 - y0 - d0 - c0
         slope, bend = d1 - d0 - 2 * c0, c1 - c0
-        a3, a4, a5 = (
-            10 * rest - 4 * slope + bend,
-            -15 * rest + 7 * slope - 2 * bend,
-            6 * rest - 3 * slope + bend,
-        )
-        return np.asarray(y0 + t * (d0 + t * (c0 + t * (a3 + t * (a4 + t * a5)))))
+        a3 = 10 * rest - 4 * slope + bend
+        a4, a5 = -15 * rest + 7 * slope - 2 * bend, 6 * rest - 3 * slope + bend
+        return np.stack([y0, d0, c0, a3, a4, a5])
 
 
 def turning_along(
@@ -80,13 +84,13 @@ def turning_along(
         u, steered, turns = steered_along(path, steering, motion, start, rests)
     if not len(steering.castors):
         return Turning(steering, np.zeros(0), none, none, none, u, steered, turns)
-    s, castor, rate, bend = _castors(path, steering, motion, start)
-    return Turning(steering, s, castor, rate, bend, u, steered, turns)
+    s, castor, rate, bend, places = _castors(path, steering, motion, start)
+    return Turning(steering, s, castor, rate, bend, u, steered, turns, places)
 
 
 def _castors(
     path: Path, steering: Steering, motion: Motion, start: Mapping[int, float]
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Array]:
     """Cells are halved until the angles in their middles, solved and interpolated, agree."""
     at = steering.castors
     trail = steering.trail[at]
@@ -94,7 +98,7 @@ def _castors(
     count = np.ceil(np.diff(path.knot_parameters) / (_STEP * trail.min())).astype(int)
     u = cells(path, np.maximum(count, 4))
     known: Turning | None = None
-    for _ in range(_ROUNDS):
+    for done in range(_ROUNDS):
         s = path.parameter(u)
         nodes = (u[:-1, None] + np.diff(u)[:, None] * _GAUSS).ravel()
         samples, _ = motion(path.parameter(nodes), nodes)
@@ -115,11 +119,11 @@ def _castors(
         else:
             off = np.abs(known._castors(s) - angle).max(axis=1)
             coarse = (off[1:] > _SWIVEL) | (off[:-1] > _SWIVEL)
-        if not coarse.any():
+        if not coarse.any() or done == _ROUNDS - 1:
             break
         known = found
         u = np.sort(np.concatenate([u, ((u[:-1] + u[1:]) / 2)[coarse]]))
-    return s, angle, rate, bend
+    return s, angle, rate, bend, u
 
 
 def _castor_rates(

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import shapely
 
 from trajopt.arrays import Array, rotation
 from trajopt.paths.path import Path
 from trajopt.world.obstacles import Obstacle
+
+if (
+    TYPE_CHECKING
+):  # takes as long to load as a short command; loaded where things stand on the ground
+    import shapely
 
 SPACING = 0.005  # m of path parameter between places that are looked at; chosen
 _TOUCH = 1e-9  # m of depth that is rounding; chosen
@@ -45,11 +49,15 @@ class Standing:
 
     @cached_property
     def _solids(self) -> list[shapely.Polygon]:
+        import shapely
+
         return [shapely.Polygon(thing.outline) for thing in self.obstacles]
 
     def margin(self, x: Array, y: Array, yaw: Array) -> Array:
         """Distance (m) of the outline from the nearest obstacle at poses of any shape, or less
         where it is farther than the outline's reach; where it crosses one, minus the depth."""
+        import shapely
+
         places, angles = np.stack([np.ravel(x), np.ravel(y)], axis=1), np.ravel(yaw)
         reach = float(np.hypot(*np.transpose(self.footprint)).max())
         least = np.full(len(places), np.inf)
@@ -74,6 +82,8 @@ def crossings(
     """Every stretch of a path on which the outline crosses an obstacle, obstacle by obstacle."""
     if not obstacles:
         return ()
+    import shapely
+
     s = np.linspace(0.0, path.length, max(int(np.ceil(path.length / SPACING)), 1) + 1)
     u = path.locate(s)
     outlines = shapely.polygons(outlines_at(path.position(u)[:, :2], path.yaw(u), footprint))
@@ -98,6 +108,8 @@ def outlines_at(places: Array, yaw: Array, footprint: Sequence[tuple[float, floa
 
 def _depth(solid: shapely.Polygon, outline: shapely.Polygon) -> float:
     """How far (m) a corner of what both have in common is inside one of them."""
+    import shapely
+
     corners = shapely.points(shapely.get_coordinates(shapely.intersection(solid, outline)))
     inside = [shapely.distance(whole.exterior, corners) for whole in (solid, outline)]
     return float(np.max(inside, initial=0.0))

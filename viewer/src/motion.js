@@ -148,7 +148,7 @@ byId("cameras").firstChild.click();
 player.onSlow = () => {
   if (!sun.castShadow) return;
   sun.castShadow = false;
-  for (const { mesh } of robots[solid].meshes) mesh.material.needsUpdate = true;
+  robots[solid].mesh.material.needsUpdate = true;
 };
 player.slowest = SLOW;
 player.start();

@@ -1,9 +1,10 @@
-// A robot as a tree of links: places them for joint angles, draws equal shapes together.
+// A robot as a tree of links: places them for joint angles, draws them together.
 import {
-  Color, Group, InstancedMesh, LineBasicMaterial, LineSegments, EdgesGeometry, Matrix4, Mesh, MeshBasicMaterial,
-  MeshLambertMaterial, Quaternion, Shape, ShapeGeometry, SRGBColorSpace, Vector2, Vector3,
+  Color, Group, LineBasicMaterial, LineSegments, EdgesGeometry, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
+  Quaternion, Shape, ShapeGeometry, SRGBColorSpace, Vector2, Vector3,
 } from "three";
 import { between, locate } from "./data.js";
+import { Merged } from "./merged.js";
 import { geometryOf } from "./shapes.js";
 
 const MARK = new Color("#e8e8e4"); // of what shows how a wheel has turned
@@ -54,17 +55,15 @@ export class Robot {
 
   build(tint) {
     const { looks, geometries } = this.model;
-    this.meshes = geometries.map((geometry, shape) => {
-      const shown = looks.filter((look) => look.shape === shape);
-      const material = new MeshLambertMaterial();
-      if (tint) Object.assign(material, { transparent: true, opacity: 0.34, depthWrite: false });
-      const mesh = new InstancedMesh(geometry, material, shown.length);
-      shown.forEach((look, k) => mesh.setColorAt(k, tint ? look.colour.clone().lerp(new Color(tint), 0.75) : look.colour));
-      mesh.frustumCulled = false;
-      mesh.castShadow = !tint;
-      this.group.add(mesh);
-      return { mesh, shown };
-    });
+    const material = new MeshLambertMaterial({ vertexColors: true });
+    if (tint) Object.assign(material, { transparent: true, opacity: 0.34, depthWrite: false });
+    this.merged = new Merged(looks.map(({ shape, colour }) => ({
+      geometry: geometries[shape], colour: tint ? colour.clone().lerp(new Color(tint), 0.75) : colour,
+    })));
+    this.mesh = new Mesh(this.merged.geometry, material);
+    this.mesh.frustumCulled = false;
+    this.mesh.castShadow = !tint;
+    this.group.add(this.mesh);
     this.addNose(tint);
     this.edges = looks.filter((look) => look.link === 0).slice(0, 1).map((look) => {
       const lines = new LineSegments(
@@ -106,10 +105,8 @@ export class Robot {
       world[i].multiply(turn);
     }
     const placed = new Matrix4();
-    for (const { mesh, shown } of this.meshes) {
-      shown.forEach((look, k) => mesh.setMatrixAt(k, placed.multiplyMatrices(world[look.link], look.pose)));
-      mesh.instanceMatrix.needsUpdate = true;
-    }
+    model.looks.forEach((look, k) => this.merged.place(k, placed.multiplyMatrices(world[look.link], look.pose).elements));
+    this.merged.update();
     this.nose.mesh.matrix.multiplyMatrices(world[0], this.nose.look.pose);
     for (const { lines, look } of this.edges) lines.matrix.multiplyMatrices(world[look.link], look.pose);
   }

@@ -5,12 +5,11 @@ One implicit step in time. The unknowns are the body's twist and the turning rat
 mass, wheel motors (the PD loop of [udengaard2008], section 4.3) and ground are in balance:
 
 - a motor pushes with K_p e + K_d e', so a loaded wheel runs behind its command by force over
-stiffness;
+  stiffness;
 - rubber creeps: a wheel that pushes loses a share of its travel, force over load over
-``SLIP_STIFFNESS``;
+  ``SLIP_STIFFNESS``;
 - no wheel pushes with more than friction times its load (Coulomb). Beyond that it slides, and the
-force points
-  against the sliding, along the wheel and across it together;
+  force points against the sliding, along the wheel and across it together;
 - a wheel that stands on a slope is pushed down it by its load times the slope.
 
 Wheels on the ground carry equal shares of the weight, on a body that stays level; modules have no

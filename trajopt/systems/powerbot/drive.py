@@ -96,7 +96,13 @@ def driven_columns(trajectory: Trajectory) -> list[int]:
 
 def faster(trajectory: Trajectory, factor: float) -> Trajectory:
     """The same motion in 1/``factor`` of its time: forces grow with the square."""
-    return replace(trajectory, sd=trajectory.sd * factor, sdd=trajectory.sdd * factor**2)
+    return replace(
+        trajectory,
+        sd=trajectory.sd * factor,
+        sdd=trajectory.sdd * factor**2,
+        profile=None if trajectory.profile is None else trajectory.profile.slower(1 / factor),
+        bound=None,
+    )
 
 
 def shifted(pose: Array, error: Sequence[float]) -> Array:

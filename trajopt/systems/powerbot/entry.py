@@ -140,7 +140,7 @@ class Details:
             found["printed"] = {**shown, "ours": ours}
         return found
 
-    def save(self, folder: FilePath, *, pictures: bool) -> None:
+    def save(self, folder: FilePath, *, pictures: str | None) -> None:
         run, where = self.run, self.course
         if run is None or where is None:
             return
@@ -150,9 +150,11 @@ class Details:
         columns = (run.times, run.s, run.v, *run.pose.T, run.gap)
         write_table(folder / "with_encounters.csv", dict(zip(names, columns, strict=True)))
         if pictures:
-            from trajopt.systems.powerbot.pictures import draw_replan
+            from trajopt.report.style import in_style, save_figure
+            from trajopt.systems.powerbot.pictures import replan_figure
 
-            draw_replan(run, where, folder / "with_encounters.png")
+            with in_style():
+                save_figure(replan_figure(run, where), folder / f"with_encounters.{pictures}")
 
 
 def details(solution: Solution) -> Details:

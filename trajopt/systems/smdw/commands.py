@@ -10,18 +10,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
-from rich import box
-from rich.table import Table
 
 from trajopt.cli.shared import (
     FAULTY,
     Bar,
     ControlOption,
+    FormatOption,
     Overrides,
     ProblemFile,
     console,
     control_mode,
     overrides,
+    picture_kind,
+    simple_table,
 )
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
@@ -41,17 +42,19 @@ def plan(
         Path | None, typer.Option("--out", help="folder for pictures and a run folder a plan")
     ] = None,
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folders")] = True,
+    format_: FormatOption = None,
 ) -> None:
     """Plan every configuration that can climb a step, best first."""
     from trajopt.pipeline import solve
     from trajopt.problem import load_problem
 
+    kind = picture_kind(pictures, format_)
     solution = solve(_climb(load_problem(problem, overrides(set_))), optimizer=optimizer, seed=seed)
     found = cast("Maneuver", solution.details)
     console.print(
         words((found.problem.title, "bold"), f": {found.status} ({found.wall_time:.2f} s)")
     )
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    table = simple_table()
     for column in (
         "configuration",
         "duration (s)",
@@ -88,8 +91,8 @@ def plan(
             alone = replace(
                 solved, details=None
             )  # what all plans share stands beside their folders
-            write_solution(alone, folder, seed=seed, command=" ".join(sys.argv), pictures=pictures)
-        found.save(out, pictures=pictures)
+            write_solution(alone, folder, seed=seed, command=" ".join(sys.argv), pictures=kind)
+        found.save(out, pictures=kind)
         console.print(f"written to {out}", soft_wrap=True)
     if not found.plans:
         raise typer.Exit(FAULTY)
@@ -112,6 +115,7 @@ def climb(
         Path | None, typer.Option("--out", help="folder for trials.csv and a picture")
     ] = None,
     pictures: Annotated[bool, typer.Option(help="draw a picture into the folder")] = True,
+    format_: FormatOption = None,
 ) -> None:
     """Drive a plan in physics and climb from where it ends, many times with random errors."""
     from trajopt.problem import load_problem
@@ -126,6 +130,7 @@ def climb(
     )
     from trajopt.systems.smdw.trials import climb_trials
 
+    kind = picture_kind(pictures, format_)
     for name, value, least in (
         ("--trials", trials, 1),
         ("--first", first, 0),
@@ -170,8 +175,8 @@ def climb(
         climb_trials_table(done, f"{chosen.configuration.name} in {engine}, control: {control}")
     )
     if out is not None:
-        if pictures:
-            save_climb_trials_picture(done, found.problem, chosen, out)
+        if kind:
+            save_climb_trials_picture(done, found.problem, chosen, out, kind)
             write_trial_page(done, found.problem, chosen, out)
         console.print(f"written to {out}", soft_wrap=True)
 

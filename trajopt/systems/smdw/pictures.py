@@ -61,7 +61,7 @@ def geometry_figure(wheel: DoubleWheel, height: float) -> Figure:
         drawn = ax.contourf(
             np.degrees(theta), np.degrees(alpha), values, levels=levels, cmap=colours, extend="both"
         )
-        figure.colorbar(drawn, ax=ax)
+        figure.colorbar(drawn, ax=ax, label=title)
         ax.contour(
             np.degrees(theta),
             np.degrees(alpha),
@@ -160,11 +160,13 @@ def _draw_plan(ax: Axes, problem: Problem, plan: Plan) -> None:
     ax.set(title=f"{plan.configuration.name}: {plan.duration:.2f} s", xlabel="x (m)", ylabel="")
 
 
-def save_maneuver_pictures(maneuver: Maneuver, folder: FilePath) -> tuple[FilePath, ...]:
-    """Write plans.png (every plan) and geometry.png (what the wheel's outline says) into
+def save_maneuver_pictures(
+    maneuver: Maneuver, folder: FilePath, kind: str = "png"
+) -> tuple[FilePath, ...]:
+    """Write plans.png (every plan) and geometry.png (what the wheel's outline says), or of another ``kind``, into
     ``folder``; their paths."""
     folder.mkdir(parents=True, exist_ok=True)
-    plans, geometry = folder / "plans.png", folder / "geometry.png"
+    plans, geometry = folder / f"plans.{kind}", folder / f"geometry.{kind}"
     with in_style():
         save_figure(plans_figure(maneuver), plans)
         save_figure(

@@ -115,12 +115,12 @@ class Maneuver:
         }
         return {"plans": plans, "refused": {r.configuration.name: r.reason for r in self.refused}}
 
-    def save(self, folder: FilePath, *, pictures: bool) -> None:
+    def save(self, folder: FilePath, *, pictures: str | None) -> None:
         """Pictures of all plans and of the wheel's geometry."""
         if pictures:
             from trajopt.systems.smdw.pictures import save_maneuver_pictures
 
-            save_maneuver_pictures(self, folder)
+            save_maneuver_pictures(self, folder, pictures)
 
     @property
     def status(self) -> str:

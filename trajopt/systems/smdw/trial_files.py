@@ -104,9 +104,9 @@ def write_climb_trials(
 
 
 def save_climb_trials_picture(
-    trials: Sequence[ClimbTrial], problem: Problem, plan: Plan, folder: FilePath
+    trials: Sequence[ClimbTrial], problem: Problem, plan: Plan, folder: FilePath, kind: str = "png"
 ) -> FilePath:
-    """Draw approaches and climbs from above into trials.png; its path.
+    """Draw approaches and climbs from above into trials.png, or of another ``kind``; its path.
 
     A step in another direction is drawn turned, so that its normal points along x. Runs that left
     physics are not drawn.
@@ -138,9 +138,8 @@ def save_climb_trials_picture(
         ),
     ]
     with in_style():
-        return save_figure(
-            motions_figure(panels, problem.robot, columns=2), made_folder(folder) / "trials.png"
-        )
+        figure = motions_figure(panels, problem.robot, columns=2)
+        return save_figure(figure, made_folder(folder) / f"trials.{kind}")
 
 
 def write_trial_page(

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from trajopt.arrays import Array
@@ -50,9 +51,13 @@ def motions_figure(panels: Sequence[Motions], robot: Robot, columns: int = 3) ->
     figure = new_figure(3.3 * rows + 0.3, 8.8)
     grid = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
     for ax, panel in zip(grid, panels, strict=False):
-        for pose, good in zip(panel.poses, panel.good, strict=True):
-            ax.plot(pose[:, 0], pose[:, 1], color=BLUE if good else VERMILION, linewidth=0.8)
-            draw_robot(ax, robot, pose[-1], colour=BLUE if good else VERMILION)
+        for wanted, colour in ((False, VERMILION), (True, BLUE)):
+            chosen = [p for p, good in zip(panel.poses, panel.good, strict=True) if good == wanted]
+            ways = LineCollection([p[:, :2] for p in chosen], colors=colour, linewidths=0.8)
+            ax.add_collection(ways)
+            ax.autoscale_view()
+            for pose in chosen:
+                draw_robot(ax, robot, pose[-1], colour=colour)
         if panel.ideal is not None:
             ax.plot(
                 panel.ideal[:, 0], panel.ideal[:, 1], color=BLACK, linewidth=1.2, linestyle="--"

@@ -1,0 +1,5 @@
+"""``python -m trajopt``: the command line."""
+
+from trajopt.cli import main
+
+main()

@@ -1,0 +1,320 @@
+"""The fastest profile on a graded grid, checked inside every cell, with a bound on what is left.
+
+A cell's rows hold at its ends by construction (``timing/reach.py``) and are checked at its quarters.
+Where one is broken by much, the cell takes constant u; where by little, its rows are tightened; what
+is left is removed by slowing the whole motion. Beside it stands a lower bound on the time of any
+motion (``timing/relaxed.py``); cells where the two differ most are split until they are near.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from trajopt.arrays import Array, BoolArray
+from trajopt.errors import InfeasibleError
+from trajopt.limits.limit import Limit
+from trajopt.timing.cells import Cells, Measure, Source, cells_of
+from trajopt.timing.profile import Profile
+from trajopt.timing.stages import SD2_CAP
+from trajopt.timing.track import Track
+
+_ROUNDS = 5  # of tightening on one grid; chosen
+_MUCH = 3e-4  # excess from which a cell takes constant u; chosen
+_LITTLE = 2e-6  # excess that is left to slowing down; chosen
+_LEFT = 2e-5  # excess after the first rounds for which further ones are not spent; chosen
+_KEPT = 1e-9  # relative violation that counts as none
+_TIGHTER = (0.0, 1e-4, 1e-3)  # off all rows, in turn, where slowing down does not help; chosen
+LARGEST_SLOWDOWN = 1.001  # of time; chosen
+_MOST_CELLS = 40_000  # chosen
+_REFINEMENTS = 8  # of the grid; chosen
+_SAME = 1e-9  # relative difference of speeds that counts as equal
+
+
+class Stuck(Exception):
+    """No motion on this grid; what forbids it is found elsewhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ask:
+    """What is wanted: ends in s' (m/s), stops (spline parameters), and the largest gap or None."""
+
+    track: Track
+    limits: Sequence[Limit]
+    start: float
+    end: float
+    stops: Array
+    gap: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A profile on its cells, the factor on time that removed what was left, and the least time of
+    any motion, s (None where it was not asked for)."""
+
+    cells: Cells
+    profile: Profile
+    slowdown: float
+    bound: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    y: Array
+    first: Array
+    last: Array
+    over: Array  # (N,) share of the rows' scale by which they are broken in each cell
+    factor: Array  # (N,) on y, what removes that
+
+
+def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
+    """On the grid u (N+1,), refined as the gap or broken rows ask for. Raises Stuck,
+    InfeasibleError."""
+    measure = Measure.of(ask.track)
+    best: Found | None = None
+    for done in range(_REFINEMENTS + 1):
+        cells = cells_of(ask.track, measure, u, source, jumps)
+        solved, worst, over = _kept(ask, cells)
+        split = over
+        if worst <= LARGEST_SLOWDOWN**2:
+            slow = float(np.sqrt(worst))
+            profile = Profile(measure, u, cells.d, solved.y, solved.first, solved.last).slower(slow)
+            if not np.isfinite(profile.seconds).all():
+                raise _standing(cells, profile.seconds)
+            found = Found(cells, profile, slow, None)
+            if ask.gap is None:
+                return found
+            bound, seconds = _bound(ask, cells)
+            best = replace(found, bound=bound)
+            total = float(profile.seconds.sum())
+            if total - bound <= ask.gap * total:
+                return best
+            lost = profile.seconds - seconds
+            split = lost > 0.25 * ask.gap * total / len(cells.d)
+            split |= over if slow > 1 + ask.gap / 10 else False
+        if done == _REFINEMENTS or len(u) > _MOST_CELLS or not split.any():
+            break
+        u = np.sort(np.concatenate([u, ((u[:-1] + u[1:]) / 2)[split]]))
+    if best is not None:
+        return best
+    at = int(np.argmax(solved.over))
+    limit, place = broken(cells, solved, at)
+    raise InfeasibleError(
+        limit,
+        place,
+        "it is broken between gridpoints, however fine the grid: "
+        "it jumps here, or falls to zero too fast to be followed",
+    )
+
+
+def _kept(ask: Ask, cells: Cells) -> tuple[_Solved, float, BoolArray]:
+    """A profile, the factor on y that makes it keep all rows (inf where none does), and the cells
+    whose rows are broken most."""
+    for tighter in _TIGHTER:
+        solved = _solve(ask, cells, tighter)
+        worst = max(1.0, float(solved.factor.max()))
+        if np.isfinite(worst):
+            if cells.table.c.min(initial=1.0) > 0:  # what rest keeps, slowing down keeps
+                break
+            y, first, last = (m / worst for m in (solved.y, solved.first, solved.last))
+            left, _ = _excess(cells, y, first, last)
+            if left.max() <= _KEPT:
+                break
+            worst = np.inf
+    over = solved.over > max(_LITTLE, 0.1 * float(solved.over.max()))
+    return solved, worst, over
+
+
+def _solve(ask: Ask, cells: Cells, tighter: float) -> _Solved:
+    """Solved and re-solved with what the check between the gridpoints found."""
+    from trajopt.timing import ranges, reach
+
+    count = len(cells.d)
+    tight = np.full(len(cells.places), tighter)
+    constant = np.zeros(count, dtype=np.bool_)
+    left, right, middle = cells.left, cells.right, cells.middle
+    start, end = _ends(ask, cells)
+    best: _Solved | None = None
+    for done in range(_ROUNDS):
+        cap = cells.cap * (1 - tight)
+        c = cells.table.c - tight[:, None] if tight.any() else cells.table.c
+        top, bottom = np.full(len(cap), np.inf), np.zeros(len(cap))
+        rests = np.empty(len(cap), dtype=np.bool_)
+        if (
+            ranges.ceilings(cells.solved, cells.table.a, cells.table.b, c, cap, top, bottom, rests)
+            >= 0
+        ):
+            if best is None:
+                raise Stuck
+            break
+        node = _nodes(ask, cells, top)
+        sets = np.empty((count + 1, 2))
+        last = _onto(end, 0.0, min(node[-1], top[right[-1]]), tight[right[-1]])
+        sets[-1] = last
+        failed = reach.backward(
+            cells.d,
+            left,
+            right,
+            cells.table.a,
+            cells.table.b,
+            c,
+            top,
+            bottom,
+            rests,
+            node,
+            constant,
+            sets,
+        )
+        if failed >= 0:
+            if best is None:
+                raise Stuck
+            break
+        first = _onto(start, sets[0, 0], sets[0, 1], tight[left[0]])
+        y, u0, u1 = np.empty(count + 1), np.empty(count), np.empty(count)
+        reach.forward(
+            cells.d,
+            left,
+            right,
+            middle,
+            cells.table.a,
+            cells.table.b,
+            c,
+            top,
+            constant,
+            sets,
+            first,
+            y,
+            u0,
+            u1,
+        )
+        if y.max() >= SD2_CAP * (1 - 1e-9):
+            raise Stuck
+        over, factor = _excess(cells, y, u0, u1)
+        solved = _Solved(y, u0, u1, over, factor)
+        if best is None or over.max() < best.over.max():
+            best = solved
+        if over.max() <= _LITTLE or (done >= 3 and over.max() <= _LEFT):
+            break
+        much = over > _MUCH
+        widened = much.copy()
+        widened[1:] |= much[:-1]
+        widened[:-1] |= much[1:]
+        little = (over > _LITTLE / 4) & ~(widened & ~constant)
+        constant |= widened
+        more, added = 1.1 * np.where(little, np.minimum(over, 0.02), 0.0), np.zeros(len(tight))
+        np.maximum.at(added, left, more)
+        np.maximum.at(added, right, more)
+        tight = tight + added
+    assert best is not None
+    return best
+
+
+def _ends(ask: Ask, cells: Cells) -> tuple[float, float]:
+    """y at both ends."""
+    g, _ = Measure.of(ask.track).stretch(cells.places[[0, -1]])
+    return float((ask.start * g[0]) ** 2), float((ask.end * g[1]) ** 2)
+
+
+def _onto(wanted: float, low: float, high: float, tight: float) -> float:
+    """``wanted`` in [low, high], where rounding or tightening alone may have put it outside."""
+    slack = (_SAME + 2 * tight) * max(abs(high), abs(low))
+    if not low - slack <= wanted <= high + slack:
+        raise Stuck
+    return min(max(wanted, low), high)
+
+
+def _nodes(ask: Ask, cells: Cells, top: Array) -> Array:
+    """(N+1,): bounds on y at gridpoints, 0 at stops."""
+    node = np.append(top[cells.left], top[cells.right[-1]])
+    node[1:] = np.minimum(node[1:], top[cells.right])
+    if len(ask.stops):
+        near = np.abs(cells.u[:, None] - ask.stops).min(axis=1)
+        node[near <= 1e-12 * (cells.u[-1] - cells.u[0])] = 0.0
+    return node
+
+
+def _excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]:
+    """(N,) each: share of a row's scale by which it is broken in every cell, and the factor on y
+    that removes that."""
+    from trajopt.timing import reach
+
+    over, factor = np.empty(len(cells.d)), np.empty(len(cells.d))
+    table = cells.table
+    reach.excess(
+        cells.d,
+        cells.left,
+        cells.right,
+        table.a,
+        table.b,
+        table.c,
+        cells.cap,
+        y,
+        u0,
+        u1,
+        over,
+        factor,
+    )
+    return over, factor
+
+
+def _bound(ask: Ask, cells: Cells) -> tuple[float, Array]:
+    """Least time of any motion, s, and each cell's share of it."""
+    from trajopt.timing import ranges, relaxed
+
+    top, bottom = np.empty(len(cells.places)), np.empty(len(cells.places))
+    rests = np.empty(len(top), dtype=np.bool_)
+    ranges.ceilings(
+        cells.solved, cells.table.a, cells.table.b, cells.table.c, cells.cap, top, bottom, rests
+    )
+    start, end = _ends(ask, cells)
+    seconds = np.empty(len(cells.d))
+    total = relaxed.lower_bound(
+        cells.d,
+        cells.left,
+        cells.middle,
+        cells.right,
+        cells.table.a,
+        cells.table.b,
+        cells.table.c,
+        top,
+        _nodes(ask, cells, top),
+        start,
+        end,
+        seconds,
+    )
+    return float(total), seconds
+
+
+def _standing(cells: Cells, seconds: Array) -> InfeasibleError:
+    """Where a cell takes for ever."""
+    i = int(np.argmax(~np.isfinite(seconds)))
+    j = int(
+        cells.right[i] if cells.cap[cells.right[i]] < cells.cap[cells.left[i]] else cells.left[i]
+    )
+    name = cells.table.names[int(np.argmin(cells.table.bounds[:, j]))]
+    reason = "the robot must stand still here; end the path at the stop, or split it there"
+    return InfeasibleError(name, cells.s(j), reason)
+
+
+def broken(cells: Cells, solved: _Solved, at: int) -> tuple[str, float]:
+    """Limit and place (m) of what is broken most in a cell."""
+    worst, name, place = -np.inf, cells.table.names[0], cells.s(int(cells.left[at]))
+    for k in range(5):
+        j = int(cells.right[at]) if k == 4 else int(cells.left[at]) + k
+        u = solved.first[at] + k / 4 * (solved.last[at] - solved.first[at])
+        y = solved.y[at] + k / 4 * cells.d[at] * (solved.first[at] + u)
+        rows = cells.table.a[j] * u + cells.table.b[j] * y - cells.table.c[j]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            bounds = y / cells.table.bounds[:, j] - 1
+        if len(rows) and rows.max() > worst:
+            worst = float(rows.max())
+            name, place = (
+                cells.table.names[int(cells.table.owner[int(np.argmax(rows))])],
+                cells.s(j),
+            )
+        if np.nanmax(bounds, initial=-np.inf) > worst:
+            worst = float(np.nanmax(bounds))
+            name, place = cells.table.names[int(np.nanargmax(bounds))], cells.s(j)
+    return name, place

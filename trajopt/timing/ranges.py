@@ -1,0 +1,170 @@
+"""What rows a u + b y <= c leave of u and y at a place, or in a cell with constant u, compiled.
+
+For given y the rows with a > 0 bound u from above, those with a < 0 from below. The gap between the
+bounds is concave in y, so the ends of {y : gap >= 0} are found by Newton's method from outside,
+exactly and in a few steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from trajopt.arrays import Array, BoolArray, IndexArray
+from trajopt.kernels import kernel
+
+FLAT = 1e-13  # a row (divided by its scale) with a smaller coefficient of u does not bound u
+_TOUCH = 1e-12  # relative gap between bounds that counts as closed
+
+
+@kernel(nogil=True)
+def u_range(a: Array, b: Array, c: Array, j: int, y: float) -> tuple[float, float]:
+    """Lowest and highest u that the rows at place j leave at y."""
+    low, high = -np.inf, np.inf
+    for r in range(a.shape[1]):
+        p = a[j, r]
+        if p > FLAT:
+            high = min(high, (c[j, r] - b[j, r] * y) / p)
+        elif p < -FLAT:
+            low = max(low, (c[j, r] - b[j, r] * y) / p)
+    return low, high
+
+
+@kernel(nogil=True)
+def _pinch(
+    a: Array, b: Array, c: Array, j: int, k: int, d: float, low: float, high: float, y: float
+) -> tuple[float, float, float, float]:
+    """Gap between the bounds on u at y and its slope, and the bounds that flat rows set on y, of
+    place j alone (d = 0) or of a cell from j to k with constant u that ends in [low, high]."""
+    n_up, p_up, q_up = 0.0, 0.0, 0.0
+    n_low, p_low, q_low = 0.0, 0.0, 0.0
+    ends = 1
+    if d > 0:
+        n_up, p_up, q_up = high - y, 2 * d, 1.0
+        n_low, p_low, q_low = low - y, 2 * d, 1.0
+        ends = 2
+    y_max, y_min = np.inf, -np.inf
+    for end in range(ends):
+        i = k if end else j
+        for r in range(a.shape[1]):
+            q = b[i, r]
+            p = a[i, r] + 2 * d * end * q
+            n = c[i, r] - q * y
+            if p > FLAT:
+                if p_up == 0 or n * p_up < n_up * p:
+                    n_up, p_up, q_up = n, p, q
+            elif p < -FLAT:
+                if p_low == 0 or n * p_low < n_low * p:  # n/p > n_low/p_low with p < 0 < p_low
+                    n_low, p_low, q_low = -n, -p, -q
+            elif q > FLAT:
+                y_max = min(y_max, c[i, r] / q)
+            elif q < -FLAT:
+                y_min = max(y_min, c[i, r] / q)
+            elif c[i, r] < -_TOUCH:
+                y_max = -np.inf
+    if p_up == 0 or p_low == 0:
+        return np.inf, 0.0, y_max, y_min
+    upper, lower = n_up / p_up, n_low / p_low
+    gap = upper - lower
+    if gap < 0 and gap >= -_TOUCH * (abs(upper) + abs(lower)):
+        gap = 0.0
+    return gap, q_low / p_low - q_up / p_up, y_max, y_min
+
+
+@kernel(nogil=True)
+def end_of_feasible(
+    a: Array,
+    b: Array,
+    c: Array,
+    j: int,
+    k: int,
+    d: float,
+    low: float,
+    high: float,
+    first: float,
+    last: float,
+) -> float:
+    """The feasible y nearest to ``first``, going towards ``last``: see ``_pinch``. NaN when there is
+    none between them."""
+    down = first >= last
+    y = first
+    for _ in range(4 * a.shape[1] + 50):
+        gap, slope, y_max, y_min = _pinch(a, b, c, j, k, d, low, high, y)
+        if y_max < y - _TOUCH * abs(y):
+            if not down:
+                return np.nan
+            y = y_max
+        elif y_min > y + _TOUCH * abs(y):
+            if down:
+                return np.nan
+            y = y_min
+        else:
+            if gap >= 0:
+                return y
+            if (slope >= 0) if down else (slope <= 0):
+                return np.nan
+            step = y - gap / slope
+            if step == y:
+                return y
+            y = step
+        if (y < last) if down else (y > last):
+            if abs(y - last) > _TOUCH * max(abs(last), abs(first)):
+                return np.nan
+            y = last
+    return np.nan
+
+
+@kernel(nogil=True)
+def _pair(a: Array, b: Array, c: Array, j: int, y: float) -> tuple[int, int]:
+    """The rows that bound u from above and below at y."""
+    low, high, lower, upper = -np.inf, np.inf, -1, -1
+    for r in range(a.shape[1]):
+        p = a[j, r]
+        if p > FLAT:
+            value = (c[j, r] - b[j, r] * y) / p
+            if value < high:
+                high, upper = value, r
+        elif p < -FLAT:
+            value = (c[j, r] - b[j, r] * y) / p
+            if value > low:
+                low, lower = value, r
+    return lower, upper
+
+
+@kernel(nogil=True)
+def ceilings(
+    places: IndexArray,
+    a: Array,
+    b: Array,
+    c: Array,
+    cap: Array,
+    top: Array,
+    bottom: Array,
+    rests: BoolArray,
+) -> int:
+    """Fills at some places of P top and bottom (P,), the y that the rows there leave, top from at
+    most ``cap``, and rests (P,), whether standing still keeps the rows. Returns a place without any
+    y, or -1."""
+    lower = upper = -1
+    for j in places:
+        rest = True
+        for r in range(a.shape[1]):
+            rest = rest and c[j, r] >= 0
+        rests[j] = rest
+        high = cap[j]
+        if upper >= 0 and lower >= 0:  # the rows that met at the place before mostly meet here too
+            p, q = a[j, upper], a[j, lower]
+            if p > FLAT and q < -FLAT:
+                fall = b[j, upper] / p - b[j, lower] / q
+                if fall > 0:
+                    meet = (c[j, upper] / p - c[j, lower] / q) / fall
+                    if 0 < meet < high:
+                        high = meet
+        top[j] = end_of_feasible(a, b, c, j, j, 0.0, 0.0, 0.0, high, 0.0)
+        if np.isnan(top[j]):
+            return int(j)
+        if top[j] < cap[j]:
+            lower, upper = _pair(a, b, c, j, top[j])
+        bottom[j] = 0.0 if rest else end_of_feasible(a, b, c, j, j, 0.0, 0.0, 0.0, 0.0, top[j])
+        if np.isnan(bottom[j]):
+            bottom[j] = top[j]
+    return -1
