@@ -69,7 +69,8 @@ def solve(
             problem, optimizer=optimizer, seed=seed, budget=budget, progress=progress
         )
     elif job == "path":
-        by, expected = None if optimizer == "auto" else optimizer, "left out: a path is given"
+        by = None if optimizer == "auto" else optimizer
+        expected = "left out: a given path is not searched"
         _refuse(expected, optimizer=by, budget=budget, x0=x0, callback=callback, state=state)
         found = _timed(problem, problem.flat_path, engine)
     else:
