@@ -16,7 +16,10 @@ from benchmarks.theses.smdw_rate_pictures import rate_lines, rate_maps
 from trajopt.pipeline import solve, validate
 from trajopt.problem import load_problem
 from trajopt.report.pictures import save_physics_picture, save_pictures
+from trajopt.report.run_folder import write_solution, write_validation
 from trajopt.report.style import in_style, save_figure
+from trajopt.report.viewer.motion_page import VIEW
+from trajopt.report.viewer.record import record
 from trajopt.sweeps.store import open_store
 
 FOLDER = Path("docs/pictures")
@@ -29,14 +32,18 @@ ON_GROUND = (
 
 
 def approach() -> None:
-    """Solve one scenario, check it in physics, and keep its pictures."""
+    """Solve one scenario, check it in physics, and keep its pictures, one of them moving: what ``trajopt solve``,
+    ``trajopt validate`` and ``trajopt view --gif`` write."""
     problem = load_problem(PROBLEM, {"spline.free": ["p1", "p2"]})
     solution = solve(problem)
     assert solution.trajectory is not None
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        save_pictures(solution, folder)
-        save_physics_picture(solution, validate(solution.trajectory, problem, picture=True), folder)
+        write_solution(solution, folder, seed=0, pictures="png")
+        report = validate(solution.trajectory, problem, picture=True)
+        write_validation(report, folder, problem.robot)
+        save_physics_picture(solution, report, folder)
+        print(f"wrote {record(folder / VIEW, FOLDER / 'run.gif', size=(720, 400))}")
         for picture in ("path.png", "profile.png", "physics.png"):
             shutil.copy(folder / picture, FOLDER / picture)
             print(f"wrote {FOLDER / picture}")

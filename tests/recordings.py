@@ -16,7 +16,7 @@ def made_up(times: np.ndarray, **known: Any) -> Recording:
         "engine": "made-up", "version": "0.0", "times": times, "pose": np.zeros((len(times), 3)),
         "contacts": np.full(len(times), 4), "hits": (), "exploded": False, "reason": "",
         "wall_time": 1.25, "real_time_factor": 3.5, "picture": None, "angles": none,
-        "swivels": none,
+        "swivels": none, "suspension": none, "sliding": np.zeros((len(times), 4, 2)),
     }  # fmt: skip
     fields |= dict.fromkeys(("height", "roll", "pitch", "speed"), flat)
     wheels = (

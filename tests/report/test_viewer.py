@@ -6,16 +6,20 @@ import base64
 from pathlib import Path
 from typing import Any
 
+import imageio.v3 as imageio
 import numpy as np
 import pandas as pd
 import pytest
+from PIL import Image, ImageSequence
+from typer.testing import CliRunner
 
 import trajopt
 from benchmarks.page_speed import FRAMES, SIZE, many_bodies
-from tests.report.browser import page_of
+from tests.report.browser import need_browser, page_of
 from trajopt.arrays import fold, rotation
+from trajopt.cli import app
 from trajopt.report.run_folder import write_solution, write_validation
-from trajopt.report.viewer.motion import Motion, planned
+from trajopt.report.viewer.motion import Motion, planned, recorded_columns, simulated
 from trajopt.report.viewer.motion_page import view_data, write_view
 from trajopt.report.viewer.pages import write_page
 from trajopt.report.viewer.rollers import rim_velocity, rollers_data
@@ -174,6 +178,54 @@ def test_steered_wheels_and_castors_swing(name: str, tmp_path: Path) -> None:
                 assert abs(fold(shown - state.spin_angles[0, k])) < 1e-3
         assert page.evaluate("view.bodies") == len(model.links)
     assert turning
+
+
+def test_wheels_stand_where_physics_has_them_on_axles_that_tilt(tmp_path: Path) -> None:
+    """Modules over bumps, 1 mm: without the tilt of their axles some wheels would be 5 mm off."""
+    robot = trajopt.robot("asoc-4")
+    x, y = np.meshgrid(np.arange(-20, 41), np.arange(-20, 21))
+    ground = HeightMap(0.03 * np.sin(1.1 * x) * np.cos(0.9 * y), 0.1, (-2.0, -2.0))
+    limits = [trajopt.Speed(0.4), trajopt.Acceleration(0.5, 0.5)]
+    trajectory = trajopt.time_scale(
+        trajopt.Path.through([[0.0, 0.0], [0.4, 0.0]]), limits, robot=robot
+    )
+    scene = Scene(0.8, ground)
+    recording = trajopt.validate(trajectory, scene, engine="mujoco").recording
+    driven = simulated(recorded_columns(recording, robot), robot, "driven")
+    file = write_page("motion", view_data(robot, scene, [driven], "bumps", ""), tmp_path / "a.html")
+    links = build(robot, outline=False).suspension
+    assert len(links) == recording.suspension.shape[1] == 8  # a strut and an axle each
+    assert np.abs(recording.suspension).max() > 0.05
+    with page_of(file) as page:
+        for share in MOMENTS:
+            k = int(share * len(recording.times))
+            page.evaluate(f"view.frame({recording.times[k]})")
+            shown = [page.evaluate(f"view.place(0, '{name}')")[2] for name in robot.wheel_names]
+            np.testing.assert_allclose(shown, recording.wheel_heights[k], atol=1e-3)
+
+
+def test_a_run_is_recorded(run: Path, tmp_path: Path) -> None:
+    """Eight times as fast: frames of the size that was asked for, over the motion's time, and it moves."""
+    need_browser()
+    files = [tmp_path / "a.gif", tmp_path / "a.mp4"]
+    wanted = ["view", str(run), "--gif", str(files[0]), "--mp4", str(files[1])]
+    told = CliRunner().invoke(app, [*wanted, "--size", "160", "100", "--speed", "8"])
+    assert told.exit_code == 0, told.output
+    duration = pd.read_csv(run / "simulated.csv")["t_s"].iloc[-1] / 8
+    with Image.open(files[0]) as picture:
+        frames = [
+            np.asarray(frame.convert("L"), dtype=float) for frame in ImageSequence.Iterator(picture)
+        ]
+    assert {frame.shape for frame in frames} == {(100, 160)}
+    assert abs(len(frames) - 15 * duration) <= 2
+    moved = [np.abs(frame - frames[0]).max() for frame in frames[1:]]
+    assert min(moved) > 40
+    film = np.stack(list(imageio.imiter(files[1])))
+    assert film.shape[1:] == (100, 160, 3)
+    assert abs(len(film) - 30 * duration) <= 2
+    assert np.abs(film[-1].astype(float) - film[0]).max() > 40
+    for wrong in (["--gif", "a.png"], ["--mp4", "a.gif"], ["--gif", str(files[0]), "--speed", "0"]):
+        assert CliRunner().invoke(app, ["view", str(run), *wrong]).exit_code != 0
 
 
 def unpacked(data: dict[str, str]) -> np.ndarray:

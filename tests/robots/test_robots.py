@@ -260,7 +260,7 @@ def test_command_lists_describes_changes_and_draws(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match="for --set and --out"):
         run("--set", "body.mass=3.0")
     with pytest.raises(ArgumentError, match=r"ends in \.png"):
-        run("car", "--out", str(tmp_path / "top.pdf"))
+        run("car", "--out", str(tmp_path / "top.gif"))
 
 
 def test_loc8_is_one_robot_on_two_kinds_of_wheels() -> None:

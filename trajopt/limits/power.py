@@ -39,6 +39,6 @@ class Power:
         if speed is None:
             nothing = np.zeros_like(work.a)
             return linear_rows(self.name, nothing, nothing, nothing + self.largest, self.largest)
-        v = speed[:, None]
-        b = work.b * v + self.largest / (2 * v**2)
-        return linear_rows(self.name, work.a * v, b, 1.5 * self.largest - work.c * v, self.largest)
+        force = self.largest / speed[:, None]
+        b = work.b + force / (2 * speed[:, None] ** 2)
+        return linear_rows(self.name, work.a, b, 1.5 * force - work.c, force)

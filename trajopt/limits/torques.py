@@ -18,7 +18,10 @@ from trajopt.limits.limit import spins
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
-_SLOWEST = 1e-4  # m/s, chosen: below it the tangent of a root is too steep to compute with
+SLOWEST = (
+    1e-8  # m/s, chosen: below it the tangent of a root is too steep to compute with; wheels turn
+)
+# fast even at that speed where a path turns in no length
 
 
 def ground_torques(path: PathSamples, robot: Robot) -> Affine:
@@ -62,4 +65,4 @@ def motor_power(path: PathSamples, robot: Robot) -> Affine:
 
 def tangent_speed(sd2: Array | None) -> Array | None:
     """(N,): path speeds, m/s, at which limits that are not linear in s'^2 take their tangents."""
-    return None if sd2 is None else np.sqrt(np.maximum(sd2, _SLOWEST**2))
+    return None if sd2 is None else np.sqrt(np.maximum(sd2, SLOWEST**2))

@@ -10,6 +10,9 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.limits.torques import knows_torques
 from trajopt.robots.robot import Robot
+from trajopt.simulate.build import build
+from trajopt.simulate.engine import Recording
+from trajopt.simulate.model import Model
 from trajopt.timing.trajectory import Trajectory
 
 _MOMENTS = 2001  # at which the largest is looked for, chosen
@@ -177,6 +180,28 @@ def wheel_columns(quantity: str, values: Array, robot: Robot) -> dict[str, Array
 def column(wheel: str, quantity: str) -> str:
     """Name of a column of a wheel."""
     return f"wheel_{wheel.replace('-', '_')}_{quantity}"
+
+
+def given_columns(recording: Recording, robot: Robot) -> dict[str, Array]:
+    """What a check's recording tells of how wheels slide, ahead and to the left, m/s, and of joints that give: springs
+    (m) and axles that tilt (rad)."""
+    wheels, model = robot.description.wheels, build(robot, outline=False)
+    found = {
+        column(wheel.name, f"slip_{way}_m_s"): recording.sliding[:, i, k]
+        for i, wheel in enumerate(wheels)
+        for k, way in enumerate(("ahead", "left"))
+    }
+    joints = joint_columns(model)
+    return found | {name: recording.suspension[:, k] for k, name in enumerate(joints)}
+
+
+def joint_columns(model: Model) -> dict[str, int]:
+    """Names of the columns of joints that give, and the links they carry."""
+    links = {i: model.links[i] for i in model.suspension}
+    return {
+        f"joint_{link.name.replace('-', '_').replace('/', '_')}_{'m' if link.joint.role == 'spring' else 'rad'}": i
+        for i, link in links.items()
+    }
 
 
 def timing_table(trajectory: Trajectory) -> dict[str, Array]:

@@ -39,6 +39,7 @@ from trajopt.report.files import (
 from trajopt.report.motion import (
     binding_shares,
     column,
+    given_columns,
     sampled,
     timing_table,
     trajectory_table,
@@ -299,6 +300,7 @@ def write_validation(report: ValidationReport, folder: str | FilePath, robot: Ro
         ("planned_steering_rad", plan.steering, turns),
     ):
         columns |= {column(report.wheels[i], quantity): values[:, i] for i in which}
+    columns |= given_columns(recording, robot)
     write_table(place / "simulated.csv", {"t_s": recording.times, **columns})
     summary = validation_summary(report, robot)
     summary["run"] = {

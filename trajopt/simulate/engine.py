@@ -145,8 +145,9 @@ class Observation:
     (3,) rad/s; ``wheel_angles`` counted on, ``wheel_speeds`` rad/s, ``wheel_torques`` N m (W,),
     ``wheel_places`` (W, 3) m of the centres; ``angles`` (S,) of steered wheels and driven axles,
     ``swivels`` (C,) rad; ``loads`` (A,) N on the wheels, ``slip`` (A,) m/s: speed of a wheel over
-    the ground in the directions in which it holds; ``spin_angles`` (A,) rad, counted on, 0 for
-    balls; ``contacts`` with the ground, the deepest one's ``penetration`` (m), and ``hits``: names
+    the ground in the directions in which it holds, ``sliding`` (A, 2) m/s: that velocity ahead and to the left, in the
+    robot's frame; ``spin_angles`` (A,) rad, counted on, 0 for balls; ``suspension`` (G,): how far springs (m) and axles
+    that tilt (rad) have given, as ``model.suspension``; ``contacts`` with the ground, the deepest one's ``penetration`` (m), and ``hits``: names
     and places (x, y) of obstacles touched.
     """
 
@@ -162,7 +163,9 @@ class Observation:
     swivels: Array
     loads: Array
     slip: Array
+    sliding: Array
     spin_angles: Array
+    suspension: Array
     contacts: int
     penetration: float
     hits: tuple[tuple[str, tuple[float, float]], ...]
@@ -193,7 +196,8 @@ class Recording:
     ``pitch`` (rad) (N,) of the robot frame, its ``speed`` (N,) m/s along the heading;
     ``wheel_angles`` rad, counted on, ``wheel_speeds`` rad/s, ``wheel_torques`` N m and
     ``wheel_heights`` m of the wheel centres, all (N, W); ``angles`` (N, S), ``swivels`` (N, C) rad;
-    ``loads`` N, ``slip`` m/s and ``spin_angles`` rad (N, A); ``contacts`` (N,); ``hits`` of obstacles. ``exploded`` with
+    ``loads`` N, ``slip`` m/s and ``spin_angles`` rad (N, A), ``sliding`` m/s (N, A, 2), ``suspension`` (N, G) m and rad,
+    as ``Observation`` has them; ``contacts`` (N,); ``hits`` of obstacles. ``exploded`` with
     its ``reason`` when the run was stopped because the numbers left physics. ``wall_time`` s of
     stepping, ``real_time_factor`` simulated over wall time, ``picture`` (H, W, 3) uint8 when asked;
     where the engine found no graphics to draw it, ``no_picture`` says why.
@@ -215,7 +219,9 @@ class Recording:
     swivels: Array
     loads: Array
     slip: Array
+    sliding: Array
     spin_angles: Array
+    suspension: Array
     contacts: IntArray
     hits: tuple[Hit, ...]
     exploded: bool

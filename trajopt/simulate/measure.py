@@ -18,7 +18,7 @@ def observe(session: Session) -> Observation:
     model, base, contacts = session.model, session.base(), session.contacts()
     angles, speeds, torques = session.joints(model.spins)
     feet = session.motion(model.feet)
-    loads, slip = _wheels(session, contacts, feet)
+    loads, over = _wheels(session, contacts, feet)
     return Observation(
         base.place[0],
         base.rotation[0],
@@ -31,8 +31,10 @@ def observe(session: Session) -> Observation:
         session.joints(model.targets)[0] if model.targets else NONE,
         session.joints(model.swivels)[0] if model.swivels else NONE,
         loads,
-        slip,
+        np.sqrt(_dots(over, over)),
+        (over @ base.rotation[0])[:, :2],
         _turned(session),
+        session.joints(model.suspension)[0] if model.suspension else NONE,
         int(np.count_nonzero(contacts.solid < 0)),
         float(contacts.depth.max(initial=0.0)),
         _hits(session.stage, contacts) if len(contacts.link) else (),
@@ -49,14 +51,14 @@ def _turned(session: Session) -> Array:
 
 
 def _wheels(session: Session, contacts: Contacts, feet: Motion) -> tuple[Array, Array]:
-    """Load (A,) N and slip (A,) m/s of each wheel; slip at the contact that carries most, along the
-    roller's axis where a roller touches."""
+    """Load (A,) N of each wheel and its velocity (A, 3) m/s over the ground, at the contact that carries most, along
+    the roller's axis where a roller touches."""
     model = session.model
-    slip = np.zeros(len(model.feet))
+    found = np.zeros((len(model.feet), 3))
     wheel = model.wheel_of[contacts.link]
     used = np.flatnonzero(wheel >= 0)
     if len(used) == 0:
-        return slip, slip.copy()
+        return found[:, 0].copy(), found
     wheel, links, force = wheel[used], contacts.link[used], contacts.force[used]
     place, normal = contacts.place[used], contacts.normal[used]
     arm = place - feet.place[wheel]
@@ -68,9 +70,9 @@ def _wheels(session: Session, contacts: Contacts, feet: Motion) -> tuple[Array, 
         along = _dots(over[rolling], axis) / np.maximum(_dots(axis, axis), 1e-12)
         over[rolling] = along[:, None] * axis
     order = np.argsort(force)  # the last one written is that of the largest force
-    slip[wheel[order]] = np.sqrt(_dots(over, over))[order]
-    loads: Array = np.bincount(wheel, force, minlength=len(slip)).astype(np.float64)
-    return loads, slip
+    found[wheel[order]] = over[order]
+    loads: Array = np.bincount(wheel, force, minlength=len(found)).astype(np.float64)
+    return loads, found
 
 
 def _dots(a: Array, b: Array) -> Array:

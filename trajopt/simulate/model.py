@@ -216,6 +216,11 @@ class Model:
         return self._having(("spring", "spring"))
 
     @cached_property
+    def suspension(self) -> tuple[int, ...]:
+        """Links that give under load: on springs, and axles that tilt."""
+        return tuple(i for i, k in enumerate(self.links) if k.joint.role in ("spring", "tilt"))
+
+    @cached_property
     def is_roller(self) -> BoolArray:
         """(links,)."""
         return np.array([link.joint.role == "roller" for link in self.links])

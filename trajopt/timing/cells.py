@@ -185,6 +185,8 @@ def spots_of(measure: Measure, u: Array, breaks: BoolArray) -> Spots:
 class Source(Protocol):
     """What gives rows at the places of cells. Raises InfeasibleError."""
 
+    def edges(self, track: Track, u: Array) -> tuple[float, ...]: ...
+
     def table(self, track: Track, measure: Measure, spots: Spots) -> Table: ...
 
 
@@ -204,22 +206,28 @@ class Readable:
 
     def table(self, track: Track, measure: Measure, spots: Spots) -> Table:
         """Raises InfeasibleError where the path turns too sharply for rows per unit of s."""
-        u = spots.u
-        s = track.path.parameter(u)
-        rows = assemble(track.samples(s, u), self.limits, track.robot)
-        a, b, bounds = rows.a, rows.b, rows.bounds
-        if measure.bends:
-            g, slope = measure.stretch(u)
-            if g.max() > SHARPEST:
-                raise InfeasibleError(
-                    "path",
-                    float(s[int(np.argmax(g))]),
-                    "the path turns round in no length here; give the turn a radius, or split the "
-                    "path",
-                )
-            b = (b - a * (slope / g)[:, None]) / (g * g)[:, None]
-            a, bounds = a / g[:, None], bounds * (g * g)
+        s = track.path.parameter(spots.u)
+        rows = assemble(track.samples(s, spots.u), self.limits, track.robot)
+        a, b, bounds = per_sigma(measure, spots.u, s, rows.a, rows.b, rows.bounds)
         return Table(a, b, rows.c, bounds, rows.names, rows.row_owner, rows.edges)
+
+
+def per_sigma(
+    measure: Measure, u: Array, s: Array, a: Array, b: Array, bounds: Array
+) -> tuple[Array, Array, Array]:
+    """a, b (P, R) and bounds (L, P) per unit of sigma from those per unit of s. Raises
+    InfeasibleError where the path turns too sharply for that."""
+    if not measure.bends:
+        return a, b, bounds
+    g, slope = measure.stretch(u)
+    if g.max() > SHARPEST:
+        raise InfeasibleError(
+            "path",
+            float(s[int(np.argmax(g))]),
+            "the path turns round in no length here; give the turn a radius, or split the path",
+        )
+    b = (b - a * (slope / g)[:, None]) / (g * g)[:, None]
+    return a / g[:, None], b, bounds * (g * g)
 
 
 def cells_of(track: Track, measure: Measure, u: Array, source: Source, jumps: Array) -> Cells:

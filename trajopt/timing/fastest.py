@@ -17,7 +17,8 @@ from trajopt.arrays import Array, BoolArray
 from trajopt.errors import InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.timing.cells import Cells, Measure, Source, cells_of
-from trajopt.timing.profile import Profile
+from trajopt.timing.curved import Curved
+from trajopt.timing.profile import Profile, between
 from trajopt.timing.stages import SD2_CAP
 from trajopt.timing.track import Track
 
@@ -31,10 +32,22 @@ LARGEST_SLOWDOWN = 1.001  # of time; chosen
 _MOST_CELLS = 40_000  # chosen
 _REFINEMENTS = 8  # of the grid; chosen
 _SAME = 1e-9  # relative difference of speeds that counts as equal
+_SETTLED = 1e-6  # relative change of y that ends the tangents: the next is its square; chosen
+_MOST_TANGENTS = 100  # chosen: 6 are usual
+_SMALL = 1e-3  # of the largest y, chosen: below it, rounding counts more than what is gained
+_STILL = 1e-6  # relative change of a guess that ends the search for a better one; chosen
+_FALL = 4.0  # most by which a guess of y falls at once: rows near rest allow a few times as much
+_UNKNOWN = 1.0  # m^2/s^2, guess where only bent limits bound the motion; chosen
+_CHORDS = 6  # rounds of chords, each with what the last left; chosen
 
 
 class Stuck(Exception):
-    """No motion on this grid; what forbids it is found elsewhere."""
+    """No motion on this grid; what forbids it is found elsewhere. ``unbounded``: no row bounds the
+    speed."""
+
+    def __init__(self, unbounded: bool = False) -> None:
+        super().__init__("no motion on this grid")
+        self.unbounded = unbounded
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +71,7 @@ class Found:
     profile: Profile
     slowdown: float
     bound: float | None
+    reason: str = ""  # why the gap is larger than was asked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +89,8 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
     measure = Measure.of(ask.track)
     best: Found | None = None
     for done in range(_REFINEMENTS + 1):
-        cells = cells_of(ask.track, measure, u, source, jumps)
+        loose = cells_of(ask.track, measure, u, source, jumps)
+        cells = _settled(ask, loose, source)
         solved, worst, over = _kept(ask, cells)
         split = over
         if worst <= LARGEST_SLOWDOWN**2:
@@ -86,7 +101,7 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
             found = Found(cells, profile, slow, None)
             if ask.gap is None:
                 return found
-            bound, seconds = _bound(ask, cells)
+            bound, seconds = _bound(ask, loose, source, profile)
             best = replace(found, bound=bound)
             total = float(profile.seconds.sum())
             if total - bound <= ask.gap * total:
@@ -98,7 +113,7 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
             break
         u = np.sort(np.concatenate([u, ((u[:-1] + u[1:]) / 2)[split]]))
     if best is not None:
-        return best
+        return replace(best, reason=_reason(best, solved, len(u)))
     at = int(np.argmax(solved.over))
     limit, place = broken(cells, solved, at)
     raise InfeasibleError(
@@ -107,6 +122,17 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
         "it is broken between gridpoints, however fine the grid: "
         "it jumps here, or falls to zero too fast to be followed",
     )
+
+
+def _reason(best: Found, solved: _Solved, gridpoints: int) -> str:
+    """Why the gap stays larger than was asked for: what costs most."""
+    if best.slowdown > 1 + 1e-4:
+        limit, place = broken(best.cells, solved, int(np.argmax(solved.over)))
+        return (
+            f"limit '{limit}' at s = {place:.4g} varies faster than {gridpoints} gridpoints show, and "
+            f"the whole motion is slowed by {best.slowdown - 1:.2g} for it"
+        )
+    return f"with {gridpoints} gridpoints, which are as many as are spent, bound and motion differ"
 
 
 def _kept(ask: Ask, cells: Cells) -> tuple[_Solved, float, BoolArray]:
@@ -129,68 +155,16 @@ def _kept(ask: Ask, cells: Cells) -> tuple[_Solved, float, BoolArray]:
 
 def _solve(ask: Ask, cells: Cells, tighter: float) -> _Solved:
     """Solved and re-solved with what the check between the gridpoints found."""
-    from trajopt.timing import ranges, reach
-
-    count = len(cells.d)
     tight = np.full(len(cells.places), tighter)
-    constant = np.zeros(count, dtype=np.bool_)
-    left, right, middle = cells.left, cells.right, cells.middle
-    start, end = _ends(ask, cells)
+    constant = np.zeros(len(cells.d), dtype=np.bool_)
     best: _Solved | None = None
     for done in range(_ROUNDS):
-        cap = cells.cap * (1 - tight)
-        c = cells.table.c - tight[:, None] if tight.any() else cells.table.c
-        top, bottom = np.full(len(cap), np.inf), np.zeros(len(cap))
-        rests = np.empty(len(cap), dtype=np.bool_)
-        if (
-            ranges.ceilings(cells.solved, cells.table.a, cells.table.b, c, cap, top, bottom, rests)
-            >= 0
-        ):
-            if best is None:
-                raise Stuck
+        try:
+            y, u0, u1 = _pass(ask, cells, tight, constant)
+        except Stuck as stuck:
+            if best is None or stuck.unbounded:
+                raise
             break
-        node = _nodes(ask, cells, top)
-        sets = np.empty((count + 1, 2))
-        last = _onto(end, 0.0, min(node[-1], top[right[-1]]), tight[right[-1]])
-        sets[-1] = last
-        failed = reach.backward(
-            cells.d,
-            left,
-            right,
-            cells.table.a,
-            cells.table.b,
-            c,
-            top,
-            bottom,
-            rests,
-            node,
-            constant,
-            sets,
-        )
-        if failed >= 0:
-            if best is None:
-                raise Stuck
-            break
-        first = _onto(start, sets[0, 0], sets[0, 1], tight[left[0]])
-        y, u0, u1 = np.empty(count + 1), np.empty(count), np.empty(count)
-        reach.forward(
-            cells.d,
-            left,
-            right,
-            middle,
-            cells.table.a,
-            cells.table.b,
-            c,
-            top,
-            constant,
-            sets,
-            first,
-            y,
-            u0,
-            u1,
-        )
-        if y.max() >= SD2_CAP * (1 - 1e-9):
-            raise Stuck
         over, factor = _excess(cells, y, u0, u1)
         solved = _Solved(y, u0, u1, over, factor)
         if best is None or over.max() < best.over.max():
@@ -204,11 +178,119 @@ def _solve(ask: Ask, cells: Cells, tighter: float) -> _Solved:
         little = (over > _LITTLE / 4) & ~(widened & ~constant)
         constant |= widened
         more, added = 1.1 * np.where(little, np.minimum(over, 0.02), 0.0), np.zeros(len(tight))
-        np.maximum.at(added, left, more)
-        np.maximum.at(added, right, more)
+        np.maximum.at(added, cells.left, more)
+        np.maximum.at(added, cells.right, more)
         tight = tight + added
     assert best is not None
     return best
+
+
+def _pass(ask: Ask, cells: Cells, tight: Array, constant: BoolArray) -> tuple[Array, Array, Array]:
+    """y (N+1,), u0 and u1 (N,) of the fastest profile with rows tightened by ``tight`` (P,).
+    Cells that cannot have linear u become ``constant``. Raises Stuck."""
+    from trajopt.timing import reach
+
+    count, right = len(cells.d), cells.right
+    c = cells.table.c - tight[:, None] if tight.any() else cells.table.c
+    rows = cells.table.a, cells.table.b, c
+    top, bottom, rests = _ceilings(cells, c, cells.cap * (1 - tight))
+    node = _nodes(ask, cells, top)
+    start, end = _ends(ask, cells)
+    sets = np.empty((count + 1, 2))
+    sets[-1] = _onto(end, 0.0, min(node[-1], top[right[-1]]), tight[right[-1]])
+    failed = reach.backward(
+        cells.d, cells.left, right, *rows, top, bottom, rests, node, constant, sets
+    )
+    if failed >= 0:
+        raise Stuck
+    first = _onto(start, sets[0, 0], sets[0, 1], tight[cells.left[0]])
+    return _forward(cells, rows, top, constant, sets, first)
+
+
+def _forward(
+    cells: Cells,
+    rows: tuple[Array, Array, Array],
+    top: Array,
+    constant: BoolArray,
+    sets: Array,
+    first: float,
+) -> tuple[Array, Array, Array]:
+    """The greedy profile inside the sets (N+1, 2). Raises Stuck where nothing bounds it."""
+    from trajopt.timing import reach
+
+    count = len(cells.d)
+    y, u0, u1 = np.empty(count + 1), np.empty(count), np.empty(count)
+    reach.forward(
+        cells.d, cells.left, cells.right, cells.middle, *rows, top, constant, sets, first, y, u0, u1
+    )
+    if y.max() >= SD2_CAP * (1 - 1e-9):
+        raise Stuck(unbounded=True)
+    return y, u0, u1
+
+
+def _ceilings(cells: Cells, c: Array, cap: Array) -> tuple[Array, Array, BoolArray]:
+    """(P,) each: greatest and least y that the rows at solved places leave, and whether they leave
+    rest. Raises Stuck."""
+    from trajopt.timing import ranges
+
+    top, bottom = np.full(len(cap), np.inf), np.zeros(len(cap))
+    rests = np.empty(len(cap), dtype=np.bool_)
+    table = cells.table
+    if ranges.ceilings(cells.solved, table.a, table.b, c, cap, top, bottom, rests) >= 0:
+        raise Stuck
+    return top, bottom, rests
+
+
+def _settled(ask: Ask, loose: Cells, source: Source) -> Cells:
+    """Cells with rows of bent limits taken at the fastest profile (``timing/curved.py``), from cells
+    with rows at rest. Raises Stuck."""
+    if not isinstance(source, Curved):
+        return loose
+    none, straight = np.zeros(len(loose.places)), np.zeros(len(loose.d), dtype=np.bool_)
+
+    def tangent(y: Array) -> Cells:
+        where = ask.track, Measure.of(ask.track), loose.spots, loose.table
+        return replace(loose, table=source.tangent(*where, y))
+
+    def drive(cells: Cells) -> Array:
+        return between(cells, *_pass(ask, cells, none, straight.copy()))
+
+    def driven_on(cells: Cells) -> Array:
+        """As fast as rows allow from the start, whatever lies ahead."""
+        top, _, _ = _ceilings(cells, cells.table.c, cells.cap)
+        highest = np.minimum(_nodes(ask, cells, top), SD2_CAP / 2)
+        sets = np.stack([np.zeros(len(highest)), highest], axis=1)
+        rows = cells.table.a, cells.table.b, cells.table.c
+        first = min(_ends(ask, cells)[0], highest[0])
+        return between(cells, *_forward(cells, rows, top, straight, sets, first))
+
+    try:
+        y = drive(loose)
+    except Stuck as stuck:
+        if not stuck.unbounded:
+            raise
+        y = np.minimum(loose.cap, _UNKNOWN)
+    highest, found = y, False
+    for _ in range(_MOST_TANGENTS):
+        cells, before = tangent(y), y
+        try:
+            y, found = drive(cells), True
+        except Stuck:
+            if found:
+                break
+            try:
+                y = np.clip(driven_on(cells), before / _FALL, highest)
+            except Stuck:
+                y = before / _FALL
+            if _near(y, before, _STILL):
+                raise
+        if found and _near(y, before, _SETTLED):
+            break
+    return tangent(y)
+
+
+def _near(new: Array, old: Array, share: float) -> bool:
+    return bool(np.all(np.abs(new - old) <= share * (new + _SMALL * new.max())))
 
 
 def _ends(ask: Ask, cells: Cells) -> tuple[float, float]:
@@ -259,32 +341,48 @@ def _excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]
     return over, factor
 
 
-def _bound(ask: Ask, cells: Cells) -> tuple[float, Array]:
-    """Least time of any motion, s, and each cell's share of it."""
-    from trajopt.timing import ranges, relaxed
+def _bound(ask: Ask, cells: Cells, source: Source, profile: Profile) -> tuple[float, Array]:
+    """Least time of any motion, s, and each cell's share of it; ``cells`` have rows of bent limits at
+    rest."""
+    if not isinstance(source, Curved):
+        total, seconds, _ = _relaxed(ask, cells)
+        return total, seconds
+    low = between(cells, profile.y, profile.first, profile.last)
+    where = ask.track, profile.measure, cells.spots, cells.table
+    total, seconds, high = _relaxed(ask, cells)
+    for _ in range(_CHORDS):
+        table = source.chord(*where, (low, np.maximum(high, low)))
+        before = total
+        total, seconds, upper = _relaxed(ask, replace(cells, table=table))
+        high = np.minimum(high, upper)
+        if total - before <= (ask.gap or 0.0) / 20 * total:
+            break
+    return total, seconds
 
-    top, bottom = np.empty(len(cells.places)), np.empty(len(cells.places))
-    rests = np.empty(len(top), dtype=np.bool_)
-    ranges.ceilings(
-        cells.solved, cells.table.a, cells.table.b, cells.table.c, cells.cap, top, bottom, rests
-    )
-    start, end = _ends(ask, cells)
-    seconds = np.empty(len(cells.d))
+
+def _relaxed(ask: Ask, cells: Cells) -> tuple[float, Array, Array]:
+    """Least time of any motion that keeps the rows, s, each cell's share, and y (P,) that no motion
+    exceeds."""
+    from trajopt.timing import relaxed
+
+    table = cells.table
+    top, _, _ = _ceilings(cells, table.c, cells.cap)
+    seconds, upper = np.empty(len(cells.d)), np.minimum(cells.cap, SD2_CAP)
     total = relaxed.lower_bound(
         cells.d,
         cells.left,
         cells.middle,
         cells.right,
-        cells.table.a,
-        cells.table.b,
-        cells.table.c,
+        table.a,
+        table.b,
+        table.c,
         top,
         _nodes(ask, cells, top),
-        start,
-        end,
+        *_ends(ask, cells),
         seconds,
+        upper,
     )
-    return float(total), seconds
+    return float(total), seconds, upper
 
 
 def _standing(cells: Cells, seconds: Array) -> InfeasibleError:

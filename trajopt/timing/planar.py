@@ -38,7 +38,7 @@ from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 from trajopt.robots.start import start_angles
 from trajopt.robots.steering import steering_of
-from trajopt.timing.cells import Measure, Readable, Source, Spots, Table
+from trajopt.timing.cells import Measure, Spots, Table
 from trajopt.timing.stages import assemble
 from trajopt.timing.track import Track
 
@@ -73,6 +73,10 @@ class Planar:
     owner: IndexArray
     speeds: Array
     speed_owner: IndexArray
+
+    def edges(self, track: Track, u: Array) -> tuple[float, ...]:  # noqa: ARG002
+        """None of these limits jumps."""
+        return ()
 
     def table(self, track: Track, measure: Measure, spots: Spots) -> Table:
         """Rows at the places of cells."""
@@ -155,11 +159,6 @@ class Planar:
 
 
 _SMALLEST = 1e-3  # m, as in limits/tip
-
-
-def source_of(track: Track, measure: Measure, limits: Sequence[Limit]) -> Source:
-    """What gives rows: compiled where it can."""
-    return planar_of(track, measure, limits) or Readable(tuple(limits))
 
 
 def planar_of(track: Track, measure: Measure, limits: Sequence[Limit]) -> Planar | None:

@@ -10,8 +10,8 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.limits.limit import Limit
-from trajopt.timing.cells import Measure, cells_of
-from trajopt.timing.planar import source_of
+from trajopt.timing.cells import Cells, Measure, cells_of
+from trajopt.timing.curved import Curved, source_of
 from trajopt.timing.track import Track
 
 
@@ -78,7 +78,20 @@ def margins_of(track: Track, profile: Profile, limits: Sequence[Limit]) -> Array
     source = source_of(track, profile.measure, limits)
     cells = cells_of(track, profile.measure, profile.u, source, profile.u)
     table, slack = cells.table, np.empty((len(profile.d), len(cells.table.names)))
+    if isinstance(source, Curved):
+        y = between(cells, profile.y, profile.first, profile.last)
+        table = source.tangent(track, profile.measure, cells.spots, table, y)
     motion = profile.y, profile.first, profile.last
     rows = table.a, table.b, table.c, table.bounds, table.owner
     reach.margins(cells.d, cells.left, cells.right, *rows, *motion, slack)
     return slack
+
+
+def between(cells: Cells, y: Array, u0: Array, u1: Array) -> Array:
+    """(P,): y at all places of a profile."""
+    found = np.empty(len(cells.places))
+    for k in range(4):
+        u = u0 + k / 4 * (u1 - u0)
+        found[cells.left + k] = y[:-1] + k / 4 * cells.d * (u0 + u)
+    found[cells.right] = y[1:]
+    return np.maximum(found, 0.0)

@@ -152,25 +152,30 @@ def forward(
 @kernel(nogil=True)
 def peak(v: Array) -> float:
     """Greatest of five evenly spread values, or of the parabola through the greatest and its
-    neighbours."""
+    neighbours, where they are smooth enough for one."""
     k = 0
     for i in range(1, 5):
         if v[i] > v[k]:
             k = i
     m = min(max(k, 1), 3)
     rise, bend = (v[m + 1] - v[m - 1]) / 2, v[m - 1] + v[m + 1] - 2 * v[m]
-    if bend < 0 and abs(rise) <= -1.5 * bend:
+    uneven = 0.0  # third differences
+    if m < 3:
+        uneven = abs(v[m + 2] - 3 * v[m + 1] + 3 * v[m] - v[m - 1])
+    if m > 1:
+        uneven = max(uneven, abs(v[m + 1] - 3 * v[m] + 3 * v[m - 1] - v[m - 2]))
+    if bend < 0 and abs(rise) <= -1.5 * bend and uneven <= -bend / 2:
         at = min(max(m - rise / bend, 0.0), 4.0) - m
         return float(max(v[k], v[m] + at * (rise + at * bend / 2)))
     return float(v[k])
 
 
 @kernel(nogil=True)
-def inside(h: float, y: float, u0: float, u1: float, u: Array, square: Array) -> None:
+def inside(h: float, y0: float, y1: float, u0: float, u1: float, u: Array, square: Array) -> None:
     """Fills u and y (5,) at the ends and quarters of a cell."""
     for k in range(5):
         u[k] = u0 + k / 4 * (u1 - u0)
-        square[k] = max(y + k / 4 * h * (u0 + u[k]), 0.0)
+        square[k] = max(y0 + k / 4 * h * (u0 + u[k]), 0.0) if k < 4 else y1
 
 
 @kernel(nogil=True)
@@ -195,7 +200,7 @@ def excess(
     places = np.empty(5, dtype=np.intp)
     for i in range(len(d)):
         worst, most = 0.0, 1.0
-        inside(d[i], y[i], u0[i], u1[i], u, square)
+        inside(d[i], y[i], y[i + 1], u0[i], u1[i], u, square)
         for k in range(5):
             places[k] = right[i] if k == 4 else left[i] + k
             here, bound = square[k], cap[places[k]]
@@ -238,7 +243,7 @@ def margins(
     ``excess``."""
     u, square, values = np.empty(5), np.empty(5), np.empty(5)
     for i in range(len(d)):
-        inside(d[i], y[i], u0[i], u1[i], u, square)
+        inside(d[i], y[i], y[i + 1], u0[i], u1[i], u, square)
         for n in range(len(bounds)):
             for k in range(5):
                 bound = bounds[n, right[i] if k == 4 else left[i] + k]

@@ -122,9 +122,11 @@ def lower_bound(
     start: float,
     end: float,
     seconds: Array,
+    upper: Array,
 ) -> float:
     """Least time, s, of any motion from y = ``start`` to ``end``; fills seconds (N,), each cell's
-    share of it. ``top`` (P,) bounds y at places, ``node`` (N+1,) at gridpoints."""
+    share of it, and upper (P,), above which y of no motion lies at the ends and in the middles of
+    cells. ``top`` (P,) bounds y at places, ``node`` (N+1,) at gridpoints."""
     count = len(d)
     ahead, back = np.empty((count, 3)), np.empty((count, 3))
     y = start
@@ -141,6 +143,9 @@ def lower_bound(
     lines = np.empty((3, 2))
     for i in range(count):
         tops = (top[left[i]], top[middle[i]], top[right[i]])
+        for n in range(3):
+            j = left[i] + 2 * n if n < 2 else right[i]
+            upper[j] = min(min(ahead[i, n], back[i, n]), tops[n])
         bends = np.zeros(3)  # how far a curve that bends down rises above its chords
         for n in range(3):
             e0, e1, e2 = (

@@ -15,15 +15,15 @@ from trajopt.limits.limit import Limit, is_linear
 from trajopt.paths.path import Path
 from trajopt.paths.samples import require_moving
 from trajopt.robots.robot import Robot
-from trajopt.timing.cells import Measure, Readable
+from trajopt.timing.cells import Measure
 from trajopt.timing.compiled import forward_profile
+from trajopt.timing.curved import source_of
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
 from trajopt.timing.fastest import Ask, Stuck, fastest
 from trajopt.timing.feasibility import require_motion
 from trajopt.timing.grid import MOST_REFINED, graded_grid, initial_grid, insert, placed, split
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
-from trajopt.timing.planar import source_of
 from trajopt.timing.rests import AT, with_rests
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
@@ -123,7 +123,7 @@ def time_scale(
         require_positive("gap", gap, "(a share of the duration), or None")
     if too_fast not in ("refuse", "brake"):
         raise ArgumentError("too_fast", too_fast, "refuse or brake")
-    second_order = engine in ("auto", "compiled") and all(map(is_linear, job.limits))
+    second_order = engine in ("auto", "compiled")
     if second_order and not job.track.steers and too_fast == "refuse" and _drives_anywhere(job):
         require_moving(job.path)
         return _second_order(job, speeds, gridpoints, gap, np.zeros(0))
@@ -173,9 +173,8 @@ def _second_order(
     measure = Measure.of(along)
     knots = np.asarray(path.basis.knots)
     source = source_of(along, measure, job.limits)
-    u, edges = graded_grid(measure, gridpoints), np.zeros(0)
-    if isinstance(source, Readable):  # limits may have places where they jump
-        edges = np.asarray(source.edges(along, u), dtype=np.float64)
+    u = graded_grid(measure, gridpoints)
+    edges = np.asarray(source.edges(along, u), dtype=np.float64)
     edges = edges[(edges > 0) & (edges < path.length)]
     wanted = np.concatenate([path.locate(np.append(job.stops, edges)), along.rests, also])
     u, kept = placed(u, wanted, knots)
@@ -211,6 +210,7 @@ def _second_order(
         along.start_steering,
         profile,
         found.bound,
+        found.reason,
     )
 
 

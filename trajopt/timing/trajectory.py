@@ -66,6 +66,7 @@ class Trajectory(Shown):
     start_steering: Mapping[str, float] = field(default_factory=dict)  # rad, see ``time_scale``
     profile: Profile | None = None  # in the cells, where s'' is not constant there
     bound: float | None = None  # s, which no motion that keeps the limits beats; None: unknown
+    reason: str = ""  # why the gap is larger than was asked for
 
     def __post_init__(self) -> None:
         count = 0 if self.robot is None else len(self.robot.wheels)
@@ -139,6 +140,13 @@ class Trajectory(Shown):
         """How far the duration can be from the least possible, at most, as a share of it; None
         where no bound was asked for."""
         return None if self.bound is None else max(0.0, 1.0 - self.bound / self.duration)
+
+    @property
+    def why_gap(self) -> str:
+        """Why the gap is not known, or larger than was asked for; "" where neither is so."""
+        if self.bound is None:
+            return "no bound was asked for" if self.profile else f"engine {self.engine} makes none"
+        return self.reason
 
     def along(self, t: ArrayLike) -> tuple[Array, Array, Array]:
         """Path parameter s (m), s' and s'' at times t (N,), s. Raises ArgumentError outside [0,

@@ -161,7 +161,8 @@ window.view = {
   look: (name) => Array.from(byId("cameras").children).find((button) => button.textContent === name).click(),
   // of a link by name, read from the scene
   angle: (motion, name) => robots[motion].angleOf(model.data.names.indexOf(name)),
-  place: (motion) => robots[motion].place().toArray(),
+  // of the robot's frame, or of a link by name
+  place: (motion, name) => robots[motion].place(name ? model.data.names.indexOf(name) : 0).toArray(),
   yaw: (motion) => { const e = robots[motion].world[0].elements; return Math.atan2(e[1], e[0]); },
   corners: (name) => {
     const { geometry } = surroundings.things.find((mesh) => mesh.name === name);

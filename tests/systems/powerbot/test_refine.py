@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path as FilePath
 
 import casadi as ca
 import numpy as np
@@ -18,6 +19,7 @@ from trajopt.paths.path import Path
 from trajopt.refine.jerk import limit_jerk
 from trajopt.refine.path import corridor, optimize_path
 from trajopt.refine.profile import follow
+from trajopt.report.motion import table_times
 from trajopt.robots.robot import robot as shipped
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
@@ -34,12 +36,79 @@ def straight() -> Trajectory:
 def test_jerk_limit_reaches_the_closed_form(straight: Trajectory) -> None:
     """Trapezoid with rounded corners: every change of speed takes v/a + a/j."""
     motion = limit_jerk(straight, 1.0)
-    assert motion.duration == pytest.approx(5.0 / 1.0 + 1.0 / 0.5 + 0.5 / 1.0, rel=5e-3)
+    assert motion.duration == pytest.approx(5.0 / 1.0 + 1.0 / 0.5 + 0.5 / 1.0, rel=1e-3)
     assert np.abs(motion.jerk).max() <= 1.0 + 1e-6
     assert min(motion.margins().values()) >= -1e-9
-    s, v, a, _ = motion.along(np.array([0.0, motion.duration]))
+    s, v, a = motion.along(np.array([0.0, motion.duration]))
     assert s == pytest.approx([0.0, 5.0], abs=1e-6)
     assert np.abs([*v, *a]).max() < 1e-6
+
+
+def closed_form(length: float, v: float, a: float, jerk: float) -> float:
+    """Seconds from rest to rest on a straight line: seven, five or four pieces of constant jerk."""
+    ramp = v / a + a / jerk if a * a <= v * jerk else 2 * math.sqrt(v / jerk)
+    if v * ramp <= length:
+        return 2 * ramp + (length - v * ramp) / v
+    peak = a * (math.sqrt((a / jerk) ** 2 + 4 * length / a) - a / jerk) / 2
+    if peak >= a * a / jerk:
+        return 2 * (peak / a + a / jerk)
+    return float((32 * length / jerk) ** (1 / 3))
+
+
+@pytest.mark.parametrize(
+    ("length", "jerk"),
+    [
+        (5.0, 1e-6),
+        (5.0, 1e-3),
+        (5.0, 10.0),
+        (5.0, 1e3),
+        (1e-5, 1e-6),
+        (1e-5, 1e3),
+        (1e-3, 1e3),
+        (100.0, 1.0),
+        (1e4, 1e-6),
+        (1e4, 1e-3),
+        (1e4, 1.0),
+        (1e4, 1e3),
+    ],
+)
+def test_jerk_limit_is_the_closed_form_at_every_size(length: float, jerk: float) -> None:
+    """From 10 um to 10 km and over nine powers of ten of jerk."""
+    fastest = time_scale(Path.through([[0, 0], [length, 0]]), (Speed(1.0), Acceleration(1.0, 1.0)))
+    motion = limit_jerk(fastest, jerk)
+    assert motion.duration == pytest.approx(closed_form(length, 1.0, 1.0, jerk), rel=1e-3)
+    assert np.abs(motion.jerk).max() <= jerk * (1 + 1e-6)
+    assert min(motion.margins().values()) >= -1e-9
+
+
+def test_a_jerk_limited_motion_is_a_whole_trajectory(tmp_path: FilePath) -> None:
+    """States are derivatives of each other and end where the path does; tables and pictures take
+    it."""
+    path = Path.through([[0, 0], [2, 0.5], [4, -0.3]], start_direction=[1, 0], end_direction=[1, 0])
+    fast = time_scale(path, [Speed(1.5), Acceleration(0.55, 0.8)], robot=shipped("powerbot"))
+    motion = limit_jerk(fast, 2.0)
+    h = 1e-4
+    t = np.linspace(0.1, motion.duration - 0.1, 50)
+    before, here, after = (motion.at(t + k * h) for k in (-1, 0, 1))
+    rate = (after.pose - before.pose) / (2 * h)
+    np.testing.assert_allclose(np.hypot(rate[:, 0], rate[:, 1]), here.twist[:, 0], atol=1e-5)
+    np.testing.assert_allclose(rate[:, 2], here.twist[:, 2], atol=1e-5)
+    _, v, a = motion.along(t)
+    ahead, behind = motion.along(t + h), motion.along(t - h)
+    np.testing.assert_allclose((ahead[0] - behind[0]) / (2 * h), v, atol=1e-6)
+    np.testing.assert_allclose((ahead[1] - behind[1]) / (2 * h), a, atol=1e-3)
+    assert np.abs(motion.jerks(t)).max() <= 2.0 * (1 + 1e-6)
+    end = motion.at(motion.duration)
+    np.testing.assert_allclose(end.pose[0, :2], [4, -0.3], atol=1e-7)
+    np.testing.assert_allclose(
+        end.wheel_angles, fast.at(fast.duration).wheel_angles, rtol=0, atol=1e-6
+    )
+    frame = motion.to_frame()
+    assert len(frame) == len(table_times(motion))
+    assert motion.energies[0] == 0
+    assert np.isfinite(motion.energy)
+    assert set(motion.binding) <= {"", "speed", "acceleration"}
+    motion.plot().savefig(tmp_path / "motion.png")
 
 
 def test_jerk_limit_on_a_bend_keeps_slip(straight: Trajectory) -> None:

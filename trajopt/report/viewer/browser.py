@@ -14,6 +14,7 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
 # Graphics by the processor, and no sandbox, which a container's root does not get.
 _FLAGS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 _READY = "window.view !== undefined"
+_running: list[Any] = []  # the browser of the outermost ``started``
 _PATIENCE = 120_000  # ms until a page must be ready, chosen: processors may be busy
 
 
@@ -23,16 +24,16 @@ def chromium() -> str | None:
 
 
 @contextmanager
-def open_page(
-    file: FilePath, size: tuple[int, int], *, scale: float = 1.0, fine: bool = False
-) -> Iterator[tuple[Any, list[str]]]:
-    """The page, without network, once it is ready; and what its console says. ``scale``: pixels of a picture over those
-    of ``size``; ``fine``: smooth edges and shadows although the processor draws.
+def started() -> Iterator[Any]:
+    """A browser; the one of a ``started`` around this where there is one, for starting it takes longer than a page.
 
-    Raises MissingDependencyError without Playwright or Chromium, SimulationError where the page does not start.
+    Raises MissingDependencyError without Playwright or Chromium.
     """
+    if _running:
+        yield _running[0]
+        return
     try:
-        from playwright.sync_api import Error, sync_playwright
+        from playwright.sync_api import sync_playwright
     except ImportError:
         raise MissingDependencyError("playwright", "video", "a browser without a window") from None
     program = chromium()
@@ -40,9 +41,27 @@ def open_page(
         raise MissingDependencyError(
             "chromium (a Debian package)", "video", "a browser without a window"
         )
-    said: list[str] = []
     with sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=program, args=list(_FLAGS))
+        _running.append(play.chromium.launch(executable_path=program, args=list(_FLAGS)))
+        try:
+            yield _running[0]
+        finally:
+            _running.pop().close()
+
+
+@contextmanager
+def open_page(
+    file: FilePath, size: tuple[int, int], *, scale: float = 1.0, fine: bool = False
+) -> Iterator[tuple[Any, list[str]]]:
+    """The page, without network, once it is ready; and what its console says. ``scale``: pixels of a picture over those
+    of ``size``; ``fine``: smooth edges and shadows although the processor draws.
+
+    Raises MissingDependencyError as ``started``, SimulationError where the page does not start.
+    """
+    said: list[str] = []
+    with started() as browser:
+        from playwright.sync_api import Error
+
         context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, device_scale_factor=scale, offline=True
         )
@@ -53,6 +72,7 @@ def open_page(
             page.goto(file.resolve().as_uri() + ("#fine" if fine else ""), timeout=_PATIENCE)
             page.wait_for_function(_READY, timeout=_PATIENCE)
         except Error as error:
+            context.close()
             raise SimulationError(f"{file}: the page does not start: {said or error}") from None
         yield page, said
-        browser.close()
+        context.close()

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from trajopt.arrays import Array, rotation
-from trajopt.report.motion import column
+from trajopt.report.motion import column, given_columns, joint_columns
 from trajopt.report.viewer.pages import packed
 from trajopt.report.viewer.robot_data import wheel_of_joint
-from trajopt.report.viewer.rollers import rim_velocity, rollers_data, sliding_velocity
+from trajopt.report.viewer.rollers import rim_velocity, rollers_data
 from trajopt.robots.robot import Robot
 from trajopt.simulate.build import build
 from trajopt.timing.trajectory import Trajectory
@@ -21,13 +22,15 @@ if TYPE_CHECKING:
     from trajopt.simulate.engine import Recording
 
 STEP = 0.01  # s between samples, chosen: a wheel that accelerates by 80 rad/s^2 is 1e-3 rad off between them
+SMOOTH = 0.1  # s over which loads and slip are averaged for the eye, chosen
 MOST = 1500  # samples of a motion; longer ones are thinned, chosen
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
     """``times`` (N,) s, ``place`` (N, 3) m and ``rotation`` (N, 3, 3) of the robot's frame, ``twist`` (N, 3) in it,
-    angles and rates (N, K) of all wheels of the robot's file, rad; ``loads`` N and ``slip`` m/s (N, K) where known."""
+    angles and rates (N, K) of all wheels of the robot's file, rad; ``loads`` (N, K) N and ``sliding`` (N, K, 2) m/s ahead
+    and to the left, where known, and ``given`` (N,) m or rad of links that give."""
 
     name: str
     times: Array
@@ -39,7 +42,8 @@ class Motion:
     steering: Array
     steering_rate: Array
     loads: Array | None = None
-    slip: Array | None = None
+    sliding: Array | None = None
+    given: Mapping[int, Array] = field(default_factory=dict)
 
 
 def planned(trajectory: Trajectory, name: str = "planned") -> Motion:
@@ -65,17 +69,17 @@ def recorded_columns(recording: Recording, robot: Robot) -> dict[str, Array]:
         ("speed_rad_s", recording.wheel_speeds, robot.wheel_names),
         ("steering_rad", steering, every),
         ("load_n", recording.loads, every),
-        ("slip_m_s", recording.slip, every),
     ):
         table |= {column(names[k], quantity): values[:, k] for k in range(len(names))}
-    return table
+    return table | given_columns(recording, robot)
 
 
 def simulated(table: Mapping[str, Array], robot: Robot, name: str) -> Motion:
     """What ``simulated.csv`` holds, thinned where it is long."""
-    count = len(table["t_s"])
+    count, loads, sliding = len(table["t_s"]), *_forces(table, robot)
     kept = np.unique(np.linspace(0, count - 1, min(count, MOST)).round().astype(int))
     table = {key: values[kept] for key, values in table.items()}
+    joints = joint_columns(build(robot, outline=False))
     times = table["t_s"]
     none = np.zeros(len(times))
     yaw, pitch, roll = (table.get(f"{k}_rad", none) for k in ("yaw", "pitch", "roll"))
@@ -93,10 +97,10 @@ def simulated(table: Mapping[str, Array], robot: Robot, name: str) -> Motion:
         (spin_rate[1:] + spin_rate[:-1]) / 2 * np.diff(times)[:, None], axis=0)])  # fmt: skip
     for k, wheel in enumerate(wheels):
         spin[:, k] = table.get(column(wheel.name, "angle_rad"), spin[:, k])
-    loads, slip = (_every_wheel(table, robot, unit) for unit in ("load_n", "slip_m_s"))
     return Motion(
         name, times, place, _attitude(roll, pitch, yaw), twist, spin, spin_rate, steering,
-        steering_rate, loads, slip,
+        steering_rate, None if loads is None else loads[kept], None if sliding is None else sliding[kept],
+        {link: table[name] for name, link in joints.items() if name in table},
     )  # fmt: skip
 
 
@@ -109,6 +113,7 @@ def motion_data(motion: Motion, robot: Robot) -> dict[str, Any]:
         values = (motion.spin if of_spin else motion.steering)[:, wheel]
         if np.any(values):
             joints[str(link)] = packed(values)
+    joints |= {str(link): packed(values) for link, values in motion.given.items()}
     found: dict[str, Any] = {
         "name": motion.name,
         "times": packed(motion.times),
@@ -118,11 +123,27 @@ def motion_data(motion: Motion, robot: Robot) -> dict[str, Any]:
     }
     if motion.loads is not None:
         found["loads"] = packed(motion.loads)
-    if motion.slip is not None:
-        sliding = sliding_velocity(motion, robot, model)
-        speed = np.maximum(np.linalg.norm(sliding, axis=2, keepdims=True), 1e-9)
-        found["slip"] = packed(sliding / speed * motion.slip[:, :, None])
+    if motion.sliding is not None:
+        found["slip"] = packed(motion.sliding)
     return found
+
+
+def _forces(table: Mapping[str, Array], robot: Robot) -> tuple[Array | None, Array | None]:
+    """Loads (N, K), N, and how wheels slide (N, K, 2), m/s, in the mean over ``SMOOTH``: contacts of rollers chatter. A
+    wheel slides as it does under load."""
+    loads, ahead, left = (
+        _every_wheel(table, robot, unit) for unit in ("load_n", "slip_ahead_m_s", "slip_left_m_s")
+    )
+    if loads is None or ahead is None or left is None:
+        return None, None
+    count = max(1, round(SMOOTH * (len(loads) - 1) / float(np.ptp(table["t_s"]))))
+
+    def mean(values: Array) -> Array:
+        return np.asarray(uniform_filter1d(values, count, axis=0, mode="nearest"))
+
+    weight = np.maximum(mean(loads), 1e-9)
+    sliding = np.stack([mean(loads * part) / weight for part in (ahead, left)], axis=2)
+    return mean(loads), sliding
 
 
 def _every_wheel(table: Mapping[str, Array], robot: Robot, unit: str) -> Array | None:

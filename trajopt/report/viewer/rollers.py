@@ -97,15 +97,6 @@ def rollers_data(motion: Motion, robot: Robot, model: Model) -> list[dict[str, A
     return found
 
 
-def sliding_velocity(motion: Motion, robot: Robot, model: Model) -> Array:
-    """Velocity (N, K, 2), body frame, m/s, of what touches the ground, along a roller's axis where it does not roll."""
-    rim, _ = _rim(motion, robot)
-    for ring in rings(motion, robot, model):
-        along = np.sum(rim[:, ring.wheel] * ring.axis, axis=1, keepdims=True)
-        rim[:, ring.wheel] = along * ring.axis
-    return rim
-
-
 def _rim(motion: Motion, robot: Robot) -> tuple[Array, Array]:
     return rim_velocity(
         robot, motion.twist, motion.steering, motion.steering_rate, motion.spin_rate
