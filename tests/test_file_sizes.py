@@ -15,8 +15,6 @@ LONGER = {
     "tests/robots/test_platforms.py": "one table of textbook robots for all wheel equations",
     "tests/sweeps/test_sweeps.py": "one runner with its helpers, from first row to resume",
     "trajopt/cli/sweep.py": "one command and its subcommands, which share options and messages",
-    "trajopt/optimize/base.py": "the contract of optimizers, to be read as a whole",
-    "trajopt/optimize/ipopt.py": "the one file that may import casadi",
     "trajopt/optimize/swarm.py": "one compiled kernel and its readable twin, side by side",
     "trajopt/robots/robot.py": "a robot, and all that follows from its file alone",
     "trajopt/refine/jerk.py": "one program, from its guesses to the checked motion",

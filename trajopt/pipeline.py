@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.objectives.terminal import terminal_objective
 from trajopt.optimize.base import Budget, Optimizer, OptimizeResult
+from trajopt.optimize.run import Callback
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
 from trajopt.problem import Problem
@@ -38,14 +40,17 @@ def solve(
     seed: int = 0,
     budget: Budget | None = None,
     x0: ArrayLike | None = None,
+    callback: Callback | None = None,
+    state: str | FilePath | None = None,
     progress: Callable[[int, float], None] | None = None,
     engine: str = "auto",
 ) -> Solution:
     """Do the job of a problem (``problem.job``): search control points and time the path, time a
     given path, or what the system of a section does.
 
-    ``optimizer``, ``budget``, ``x0`` and ``progress(evaluations, best_cost)`` are of the search
-    (auto: the lattice of exact solutions; 400 evaluations of slsqp where no wheel angle counts),
+    ``optimizer``, ``budget``, ``x0``, ``callback``, ``state`` and ``progress(evaluations,
+    best_cost)`` are of the search, as in ``minimize`` (auto: exact solutions first, then the best
+    there are; 400 evaluations of slsqp where no wheel angle counts),
     ``engine`` of time scaling. Without [actuator] a path is timed as fast as the limits allow, or
     as its [profile] asks; with it, at uniform spline speed in the nominal duration, as searched.
     Limits that no motion keeps are reported, not raised. Raises ArgumentError for bad arguments.
@@ -57,18 +62,16 @@ def solve(
         )
     job = problem.job.name
     if job in SECTIONS:
-        if x0 is not None or engine != "auto":
-            raise ArgumentError("x0, engine", (x0, engine), f"None and auto for the job '{job}'")
+        asked = None if engine == "auto" else engine
+        expected = f"left out for the job '{job}'"
+        _refuse(expected, x0=x0, callback=callback, state=state, engine=asked)
         found: Solution = entry(job).solve(
             problem, optimizer=optimizer, seed=seed, budget=budget, progress=progress
         )
     elif job == "path":
-        if optimizer != "auto" or budget is not None or x0 is not None:
-            raise ArgumentError(
-                "optimizer, budget, x0",
-                (optimizer, budget, x0),
-                "none: a given path is not searched",
-            )
+        by = None if optimizer == "auto" else optimizer
+        expected = "left out: a given path is not searched"
+        _refuse(expected, optimizer=by, budget=budget, x0=x0, callback=callback, state=state)
         found = _timed(problem, problem.flat_path, engine)
     else:
         objective = search_objective(problem)
@@ -81,10 +84,18 @@ def solve(
             x0=x0,
             seed=seed,
             budget=budget,
+            callback=callback,
+            state=state,
             progress=progress,
         )
         found = _timed(problem, objective.path(searched.x), engine, searched)
     return replace(with_details(found), wall_time=time.perf_counter() - started)
+
+
+def _refuse(expected: str, **given: Any) -> None:
+    for name, value in given.items():
+        if value is not None:
+            raise ArgumentError(name, value, expected)
 
 
 def with_details(solution: Solution) -> Solution:

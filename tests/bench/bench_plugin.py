@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.objectives.base import Evaluation
-from trajopt.optimize.base import Run, Status, checked_bounds
+from trajopt.optimize.base import Status
 
 
 @dataclass(frozen=True)
@@ -15,17 +15,12 @@ class RandomSearch:
     needs = frozenset()
     stochastic = True
 
-    def minimize(self, objective, bounds, *, x0=None, rng, budget, progress=None):
-        run = Run(objective, checked_bounds(bounds, objective.dimension), budget, progress)
-
-        def search():
-            if x0 is not None:
-                run.evaluate(np.asarray(x0, dtype=float)[None])
-            while True:
-                run.evaluate(rng.uniform(*run.bounds.T, size=(20, len(run.bounds))))
-                run.nit += 1
-
-        return run.finish(self.name, search)
+    def search(self, run, x0, rng):
+        if x0 is not None:
+            run.evaluate(x0[None])
+        while True:
+            run.evaluate(rng.uniform(*run.bounds.T, size=(20, len(run.bounds))))
+            run.nit += 1
 
 
 OPTIMIZERS = {"random-search": RandomSearch}

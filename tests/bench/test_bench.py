@@ -26,6 +26,7 @@ from trajopt.cli.bench import app
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import Budget
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
+from trajopt.sweeps.store import open_store
 
 PLUGIN = str(Path(__file__).parent / "bench_plugin.py")
 INF, NAN = np.inf, np.nan
@@ -83,8 +84,6 @@ def bad_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.slow
 def test_bad_objectives_ruin_neither_the_run_nor_other_rows(bad_store: Path) -> None:
-    from trajopt.sweeps.store import open_store
-
     store = open_store(bad_store, create=False)
     frame = store.frame()
     assert len(frame) == 7 * 2 * 2
@@ -151,8 +150,6 @@ def test_bench_files_name_the_wrong_key(tmp_path: Path, text: str, wanted: str) 
 def test_the_shipped_bench_file_names_existing_problems_and_optimizers() -> None:
     pytest.importorskip("pymoo")
     pytest.importorskip("optimagic")
-    pytest.importorskip("cma")
-    pytest.importorskip("nlopt")
     plan = load_bench(Path(__file__).parents[2] / "benchmarks" / "pso_vs_gradient.toml")
     assert len(plan.optimizers) >= 8
     assert plan.seeds >= 15
@@ -282,3 +279,23 @@ def test_other_seconds_for_costly_problems(tmp_path: Path) -> None:
     file.write_text(text + '[longer]\n"corridor/" = -1\n')
     with pytest.raises(ArgumentError, match="longer"):
         load_bench(file)
+
+
+def test_a_problem_file_is_compared_by_all_that_suit_it(tmp_path: Path) -> None:
+    """``trajopt bench MY_PROBLEM.toml``: sets of optimizers, seeds and budgets by options; the same page."""
+    problem = Path(__file__).parents[2] / "problems" / "smdw" / "table_5_3_1s.toml"
+    plan = load_bench(problem)
+    used = {case["optimizer"] for case in plan.cases()}
+    assert {"auto", "pso", "lattice", "newton", "ipopt", "slsqp"} <= used
+    store = tmp_path / "store"
+    line = ["run", str(problem), "--store", str(store), "--seeds", "2", "--evaluations", "300"]
+    line += ["--optimizer", "pso", "--optimizer", "newton", "--optimizer", "lattice"]
+    assert CliRunner().invoke(app, line).exit_code == 0
+    frame = open_store(store, create=False).frame()
+    assert sorted(frame["optimizer"]) == ["lattice", "newton", "newton", "pso", "pso"]
+    assert (frame["nfev"] <= 300).all()
+    page = write_report(open_store(store, create=False), tmp_path / "report")
+    assert "table_5_3_1s.toml" in page.read_text(encoding="utf-8")
+    (tmp_path / "wrong.toml").write_text('problems = ["a/b"]\noptimizers = ["pso"]\nseeds = 0\n')
+    with pytest.raises(ArgumentError, match="seeds"):
+        load_bench(tmp_path / "wrong.toml")

@@ -53,7 +53,7 @@ def test_improves_a_plain_function(name):
     assert result.fun == rosenbrock(result.x)
 
 
-@pytest.mark.parametrize("name", [n for n in GENERAL if n != "ipopt"])
+@pytest.mark.parametrize("name", GENERAL)
 def test_takes_a_batch_function(name):
     result = minimize(sphere_batch, BOX, optimizer=name, seed=0, budget=Budget(evaluations=3000))
     assert result.fun < 1e-2
@@ -69,12 +69,7 @@ def test_budget_of_evaluations_is_kept(name, limit):
         return rosenbrock(x)
 
     result = minimize(counted, BOX, optimizer=name, budget=Budget(evaluations=limit))
-    assert (
-        result.nfev <= limit or name == "ipopt"
-    )  # IPOPT's own line search may finish an iteration
-    if name != "ipopt":
-        # the shape probe, the final score and its proposals come on top
-        assert len(calls) <= limit + 6
+    assert len(calls) <= result.nfev <= limit
 
 
 @pytest.mark.parametrize("name", GENERAL)
@@ -84,7 +79,7 @@ def test_budget_of_seconds_ends_the_search(name):
     assert result.seconds < 2.0
 
 
-@pytest.mark.parametrize("name", [n for n in GENERAL if n != "ipopt"])
+@pytest.mark.parametrize("name", GENERAL)
 def test_target_ends_the_search(name):
     result = minimize(
         rosenbrock, BOX, optimizer=name, budget=Budget(evaluations=20_000, target=1.0)
@@ -139,7 +134,7 @@ def gives_nan(x):
     return np.where(x[0] > 0.5, np.nan, np.sum(x**2))
 
 
-@pytest.mark.parametrize("name", [n for n in GENERAL if n != "ipopt"])
+@pytest.mark.parametrize("name", GENERAL)
 @pytest.mark.parametrize("function", [raises, gives_nan])
 def test_failing_objectives_are_counted_and_survived(name, function):
     result = minimize(function, BOX, optimizer=name, seed=0, budget=Budget(evaluations=1500))
@@ -153,7 +148,7 @@ def test_an_objective_that_always_fails_says_so():
     result = minimize(lambda _: float("nan"), BOX, optimizer="pso", budget=Budget(evaluations=200))
     assert result.status is Status.FAILED
     assert not result.success
-    assert result.failures == 200
+    assert result.failures >= 199  # one call may have gone to see whether it takes batches
     assert "nan" in result.first_failure
 
 
@@ -212,11 +207,6 @@ def test_bad_arguments(arguments, what):
 def test_bad_budgets(arguments):
     with pytest.raises(ArgumentError, match="budget"):
         Budget(**arguments)
-
-
-def test_ipopt_says_what_it_needs():
-    with pytest.raises(ArgumentError, match="NumPy"):
-        minimize(lambda x: float(x[0]) ** 2, BOX, optimizer="ipopt")
 
 
 def test_lattice_says_what_it_needs():

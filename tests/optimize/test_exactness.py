@@ -47,13 +47,13 @@ def test_lattice_is_exact_through_actuators(name):
 @pytest.mark.parametrize("name", ["scenario_1_lateral", "scenario_2_forward35"])
 def test_ipopt_is_exact_through_actuators(name):
     objective = through_actuators(name)
-    result = minimize(objective, objective.bounds, optimizer="ipopt")
+    result = minimize(objective, objective.bounds, optimizer="lattice+ipopt+newton")
     assert result.fun <= 1e-7
 
 
 def test_ipopt_from_random_starts_without_the_lattice(problem):
     objective = terminal_objective(problem)
-    result = minimize(objective, objective.bounds, optimizer=Ipopt(lattice_starts=0), seed=3)
+    result = minimize(objective, objective.bounds, optimizer=Ipopt(polish=True), seed=3)
     assert result.fun <= 1e-6
 
 
@@ -81,7 +81,7 @@ def test_without_lattice_points_the_best_of_the_box_is_found(scenario):
     )
     objective = terminal_objective(small)
     box = np.array([[1.0, 1.2], [0.1, 0.2]])
-    result = Lattice().minimize(objective, box, rng=np.random.default_rng(0), budget=Budget())
+    result = minimize(objective, box, optimizer=Lattice())
     assert result.status is Status.NO_EXACT
     assert "no lattice point lies inside" in result.message
     grid = np.stack(np.meshgrid(*[np.linspace(a, b, 200) for a, b in box]), -1).reshape(-1, 2)
@@ -159,7 +159,7 @@ def test_lattice_points_are_exact_with_a_free_heading(problem):
     assert max(objective.score(x).cost[0] for x in candidates) < 1e-9
 
 
-@pytest.mark.parametrize("optimizer", ["lattice", "ipopt"])
+@pytest.mark.parametrize("optimizer", ["lattice", "lattice+ipopt+newton"])
 @pytest.mark.parametrize("free", [("heading",), ("p2", "heading")])
 def test_without_a_turn_a_free_heading_still_sets_the_wheels(scenario, optimizer, free):
     straight = with_free(scenario.replace({"goal.pose": [2.2, 0.76, 0.0]}), *free)

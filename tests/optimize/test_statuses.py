@@ -14,16 +14,14 @@ import pytest
 from trajopt.bench.problems import objective_named
 from trajopt.errors import ArgumentError, MissingDependencyError
 from trajopt.objectives.base import Evaluation
-from trajopt.optimize.base import Budget, Run, Starts, Status
-from trajopt.optimize.hybrid import Hybrid
+from trajopt.optimize.base import Budget, Status
 from trajopt.optimize.pso import ParticleSwarm
+from trajopt.optimize.run import Run
 from trajopt.optimize.scipy import ScipyLocal
 from trajopt.optimize.search import minimize, optimizer_names
+from trajopt.optimize.starts import Starts
 
 BOX = np.array([[-2.0, 3.0], [-1.5, 2.5]])
-LINE_SEARCH = (
-    40  # evaluations by which IPOPT may pass a budget: it stops between iterations, not inside one
-)
 
 
 @dataclass
@@ -80,14 +78,12 @@ def test_budgets_hold_on_objectives_of_every_kind(name: str, problem: str) -> No
             if refusal.argument == "optimizer":  # not made for this objective, and says so
                 return
             raise
-        over = LINE_SEARCH if name == "ipopt" else 0
-        assert found.nfev <= limit + over
-        assert sum(counted.asked) <= limit + over
+        assert found.nfev <= limit
         assert sum(counted.asked) <= found.nfev
 
 
 def test_ipopt_counts_gradients_and_hessians() -> None:
-    objective, bounds = objective_named("corridor/1/length")
+    objective, bounds = objective_named("asoc/dry_sand")
     found = minimize(objective, bounds, optimizer="ipopt", budget=Budget(300))
     assert found.nhev > 0
     assert found.ngev > 0
@@ -111,7 +107,7 @@ def test_scipys_flag_decides(method: Any, monkeypatch: pytest.MonkeyPatch) -> No
     def failing(*arguments: Any, **options: Any) -> Any:
         result = genuine(*arguments, **options)
         return SimpleNamespace(
-            x=result.x, nit=result.nit, success=False, message="line search failed"
+            x=result.x + 0.1, nit=result.nit, success=False, message="line search failed"
         )
 
     monkeypatch.setattr(optimize, "minimize", failing)
@@ -133,37 +129,6 @@ def test_the_start_that_found_the_best_decides() -> None:
     status, text = starts.verdict()
     assert status is Status.STALLED
     assert text == "2 of 3 starts converged; the best said 'gave up'"
-
-
-def test_hybrid_joins_histories_by_violation_too() -> None:
-    """The swarm ends infeasible with a low cost; what SLSQP then finds is feasible, dearer, and
-    better."""
-
-    @dataclass(frozen=True)
-    class Ring:
-        dimension: int = 2
-        provides: frozenset[Any] = frozenset()
-        constrained: bool = True
-
-        def evaluate(self, x: np.ndarray) -> Evaluation:
-            return Evaluation(x[:, 0], np.abs(np.hypot(x[:, 0], x[:, 1]) - 1.0))
-
-        def score(self, x: np.ndarray) -> Evaluation:
-            return self.evaluate(x[None])
-
-    box = [[-2.0, 2.0], [-2.0, 2.0]]
-    found = minimize(
-        Ring(), box, optimizer=Hybrid(swarm=ParticleSwarm(particles=5)), seed=1, budget=Budget(400)
-    )
-    h = found.history
-    for (c0, v0), (c1, v1) in zip(
-        zip(h.cost, h.violation, strict=True),
-        zip(h.cost[1:], h.violation[1:], strict=True),
-        strict=False,
-    ):
-        assert v1 < v0 or (v1 == v0 and c1 < c0) or (v1 <= 1e-9 and c1 < c0) or (v1 <= 1e-9 < v0)
-    assert found.search_fun == h.cost[-1]
-    assert found.violation <= max(h.violation[-1], 1e-9)
 
 
 def test_the_processor_clock_stands_still_while_waiting() -> None:

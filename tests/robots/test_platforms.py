@@ -13,7 +13,7 @@ from benchmarks.theses.asoc_study import wheel_frame
 from benchmarks.theses.textbook import TEXTBOOK, planar
 from benchmarks.theses.textbook import wheel as textbook_wheel
 from trajopt.errors import ArgumentError
-from trajopt.optimize.ipopt import numpy_on_symbols
+from trajopt.optimize.symbols import numpy_on_symbols
 from trajopt.robots.mobility import (
     admissible_at,
     forward_at,

@@ -36,6 +36,11 @@ TARGETS = tuple(
     10.0**-k for k in range(1, 10)
 )  # shares of reference - best still left; Moré and Wild's tau
 _SEEDS_IN_A_ROW = 5  # chosen
+# Of a problem file unless told otherwise, those that suit it: chosen, one of each kind.
+USUAL = (
+    *("auto", "pso", "pso-gbest", "cma-es", "differential-evolution", "lattice", "newton"),
+    *("ipopt", "ipopt+newton", "slsqp", "trust-constr", "cobyqa", "l-bfgs-b", "nelder-mead"),
+)
 _WARM = Budget(evaluations=60)  # a first search that loads and compiles, timed apart; chosen
 
 
@@ -84,16 +89,7 @@ def suits(method: Optimizer, objective: Any) -> bool:
         return False
     if method.name == "lattice" and not hasattr(objective, "affine_part"):
         return False
-    only_bounds = (
-        "l-bfgs-b",
-        "nelder-mead",
-        "dual-annealing",
-        "direct",
-        "bobyqa",
-        "pyswarms",
-        "pymoo-pso",
-    )
-    return not (objective.constrained and method.name in only_bounds)
+    return not (objective.constrained and getattr(method, "only_bounds", False))
 
 
 def named_optimizer(name: str, plugins: Iterable[str] = ()) -> Optimizer:
@@ -108,15 +104,21 @@ def named_optimizer(name: str, plugins: Iterable[str] = ()) -> Optimizer:
     return PEERS[name]() if name in PEERS else optimizer_named(name)
 
 
-def load_bench(path: str | Path, plugins: Iterable[str | Path] = ()) -> BenchPlan:
-    """Plan from a TOML file. Raises ArgumentError naming the key that is wrong.
+def load_bench(path: str | Path, plugins: Iterable[str | Path] = (), **changes: Any) -> BenchPlan:
+    """Plan from a TOML file, or of one problem file. Raises ArgumentError naming the key that is
+    wrong.
 
-    "more-wild/*" among the problems stands for the whole set.
+    "more-wild/*" among the problems stands for the whole set. ``changes`` are other values of the
+    plan (optimizers, seeds, evaluations, seconds); those that are None change nothing.
     """
     try:
         data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ArgumentError("bench file", str(path), f"a readable TOML file ({error})") from None
+    if "robot" in data:
+        title = f"{data.get('title', Path(path).stem)}: optimizers compared"
+        data = {"title": title, "problems": [str(Path(path).resolve())], "optimizers": list(USUAL)}
+    data.update({key: value for key, value in changes.items() if value is not None})
     known = sorted(f.name for f in fields(BenchPlan))
     for key in data.keys() - set(known):
         raise ArgumentError(f"{path}: {key}", data[key], "one of the keys " + ", ".join(known))

@@ -15,18 +15,18 @@ from numpy.random import Generator
 
 from trajopt.arrays import Array
 from trajopt.errors import MissingDependencyError
-from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Run, Status
-from trajopt.optimize.method import Method, require_unconstrained
+from trajopt.objectives.base import Capability
+from trajopt.optimize.base import Status
+from trajopt.optimize.run import Run
 
 _LARGE = 1e100  # stands for an infeasible evaluation
 EXAMPLE = {"c1": 0.5, "c2": 0.3, "w": 0.9}  # pyswarms 1.3 documentation, "Basic Optimization"
-CONSTRICTION = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # [clerc2002], as our default
+CONSTRICTION = {"c1": 1.49618, "c2": 1.49618, "w": 0.7298}  # Clerc and Kennedy 2002, as our default
 _FOREVER = 1_000_000  # iterations; the run's budget ends searches before
 
 
 @dataclass(frozen=True)
-class PySwarms(Method):
+class PySwarms:
     """pyswarms's GlobalBestPSO with its documentation's options.
 
     ``constriction``: the coefficients of our gbest PSO instead. ``equal``: also a start at rest and
@@ -35,6 +35,7 @@ class PySwarms(Method):
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
+    only_bounds: ClassVar[bool] = True
 
     constriction: bool = False
     equal: bool = False
@@ -44,19 +45,13 @@ class PySwarms(Method):
     def name(self) -> str:
         return "pyswarms"
 
-    def _require(self, objective: Objective) -> None:
-        require_unconstrained(self.name, objective)
-
-    def _search(
-        self,
-        run: Run,
-        x0: Array | None,  # noqa: ARG002 - knows no start
-        rng: Generator,
-    ) -> tuple[Status, str]:
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:  # noqa: ARG002
+        """Search; the package knows no start and no constraints."""
         try:
             from pyswarms.single.global_best import GlobalBestPSO
         except ImportError:
             raise MissingDependencyError("pyswarms", "dev", "the optimizer pyswarms") from None
+        run.constructed()
         options = CONSTRICTION if self.constriction or self.equal else EXAMPLE
         before = np.random.get_state()  # noqa: NPY002 - the only generator pyswarms knows
         np.random.seed(int(rng.integers(2**31)))  # noqa: NPY002
@@ -79,30 +74,25 @@ class PySwarms(Method):
 
 
 @dataclass(frozen=True)
-class Pymoo(Method):
+class Pymoo:
     """pymoo's PSO with its defaults (adaptive coefficients, random restarts off)."""
 
     name: ClassVar[str] = "pymoo-pso"
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
+    only_bounds: ClassVar[bool] = True
 
     particles: int = 50
 
-    def _require(self, objective: Objective) -> None:
-        require_unconstrained(self.name, objective)
-
-    def _search(
-        self,
-        run: Run,
-        x0: Array | None,  # noqa: ARG002 - knows no start
-        rng: Generator,
-    ) -> tuple[Status, str]:
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:  # noqa: ARG002
+        """Search; the package knows no start and no constraints."""
         try:
             from pymoo.algorithms.soo.nonconvex.pso import PSO
             from pymoo.core.problem import Problem
             from pymoo.optimize import minimize
         except ImportError:
             raise MissingDependencyError("pymoo", "optimizers", "the optimizer pymoo-pso") from None
+        run.constructed()
 
         class Asked(Problem):  # type: ignore[misc]  # pymoo's interface is a base class
             def _evaluate(self, x: Array, out: dict[str, Any], *_: Any, **__: Any) -> None:

@@ -23,6 +23,8 @@ from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
 from trajopt.objectives.base import Objective
 from trajopt.optimize.plugins import mapping_of_file
+from trajopt.problem import load_problem
+from trajopt.solution import search_objective
 from trajopt.sweeps.store import Store
 
 MODULES = (  # each has FAMILIES: first word of a name -> Family; loaded when a problem is asked for
@@ -78,13 +80,16 @@ def bench_problem(name: str, plugins: tuple[str, ...] = (), root: str = "problem
 def objective_named(
     name: str, plugins: tuple[str, ...] = (), root: str = "problems"
 ) -> tuple[Objective, Array]:
-    """Objective and bounds (d, 2) of the problem called ``name``; ``root`` is the folder with
-    problem files."""
+    """Objective and bounds (d, 2) of the problem called ``name``, or in the problem file of that
+    name; ``root`` is the folder with problem files."""
     for file in plugins:
         offered = mapping_of_file(file, "PROBLEMS")
         if name in offered:
             objective, bounds = offered[name]()
             return objective, np.asarray(bounds, dtype=np.float64)
+    if name.endswith(".toml"):  # a problem file
+        searched = search_objective(load_problem(name))
+        return searched, searched.bounds
     first, _, rest = name.partition("/")
     known = families()
     if first not in known:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -83,7 +84,7 @@ class BenchTables:
 
     def families(self) -> dict[str, list[int]]:
         """Positions of the problems of each family; what fits none is listed under its first
-        word."""
+        word, or its file."""
         labels = {name: like for one in families().values() for name, like in one.labels.items()}
         found: dict[str, list[int]] = {name: [] for name in labels}
         for i, problem in enumerate(self.problems):
@@ -92,7 +93,9 @@ class BenchTables:
                     found[name].append(i)
                     break
             else:
-                found.setdefault(problem.split("/")[0], []).append(i)
+                file = problem.endswith(".toml")
+                word = Path(problem).name if file else problem.split("/")[0]
+                found.setdefault(word, []).append(i)
         return {name: places for name, places in found.items() if places}
 
     def scale(self, problem: str, row: Row) -> float:

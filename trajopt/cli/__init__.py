@@ -1,5 +1,5 @@
 """The command line. Exit codes: 0 for a result that holds, 1 for one that does not, 2 for unusable
-input."""
+input, 130 where Ctrl-C or SIGTERM ended it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 
 import trajopt
 from trajopt.cli import bench, paths, robot, search, sweep, view
-from trajopt.cli.shared import leaving
+from trajopt.cli.shared import INTERRUPTED, leaving
 from trajopt.errors import TrajoptError
 
 app = typer.Typer(
@@ -68,4 +68,4 @@ def main() -> None:
         PlainConsole(stderr=True, soft_wrap=True).print(f"error: {error}")
         sys.exit(UNUSABLE)
     except KeyboardInterrupt:
-        sys.exit(130)
+        sys.exit(INTERRUPTED)

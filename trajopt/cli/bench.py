@@ -34,7 +34,9 @@ app = typer.Typer(
     help="Compare optimizers on many problems, resumable, with profiles and a page of answers.",
 )
 
-BenchFile = Annotated[Path, typer.Argument(help="bench file (*.toml)", show_default=False)]
+BenchFile = Annotated[
+    Path, typer.Argument(help="bench file or problem file (*.toml)", show_default=False)
+]
 StoreOption = Annotated[
     Path | None, typer.Option("--store", help="rows; default: out/bench/<name of the file>")
 ]
@@ -48,6 +50,12 @@ def run(
     bench_file: BenchFile,
     store: StoreOption = None,
     plugin: Plugins = None,
+    optimizer: Annotated[
+        list[str] | None, typer.Option(help="another set of optimizers; repeat it for several")
+    ] = None,
+    seeds: Annotated[int | None, typer.Option(help="of each optimizer that draws numbers")] = None,
+    evaluations: Annotated[int | None, typer.Option(help="budget of each search")] = None,
+    seconds: Annotated[float | None, typer.Option(help="budget, processor time")] = None,
     jobs: Annotated[int, typer.Option(help="searches at a time")] = 1,
     retry_failed: Annotated[
         bool, typer.Option(help="also run again what hung, raised or died")
@@ -55,10 +63,13 @@ def run(
     rerun: Rerun = False,
     keep_old: KeepOld = False,
 ) -> None:
-    """Run every search that has no row yet; started again after any interruption, it goes on."""
+    """Run every search that has no row yet; started again after any interruption, it goes on.
+
+    A problem file is searched by all optimizers that suit it."""
     from trajopt.bench.comparison import load_bench, run_bench
 
-    plan = load_bench(bench_file, plugin or ())
+    changes = {"optimizers": optimizer, "seeds": seeds, "evaluations": evaluations}
+    plan = load_bench(bench_file, plugin or (), **changes, seconds=seconds)
     place = store or default_store(bench_file)
     total = len(plan.cases())
     console.print(
@@ -81,7 +92,7 @@ def run(
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console) as bar:
+    with Progress(*columns, console=console.made) as bar:
         task = bar.add_task("searches", total=None)
 
         def report(now: SweepProgress) -> None:

@@ -10,6 +10,7 @@ import typer
 
 from trajopt.cli.shared import (
     FAULTY,
+    INTERRUPTED,
     Bar,
     ControlOption,
     FormatOption,
@@ -26,6 +27,7 @@ from trajopt.report.words import words
 if TYPE_CHECKING:
     from trajopt.arrays import Array
     from trajopt.optimize.base import Budget
+    from trajopt.problem import Problem
     from trajopt.solution import Solution
 
 Out = Annotated[
@@ -50,10 +52,14 @@ def solve(
     x0: Annotated[
         Path | None, typer.Option(help="start from a saved solution (its folder)")
     ] = None,
+    resume: Annotated[
+        bool, typer.Option(help="save the search in --out, and go on where it is saved there")
+    ] = False,
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
     format_: FormatOption = None,
 ) -> None:
     """Do the job of a problem (search, time a path, plan a climb), and write what was found."""
+    from trajopt.optimize.base import Status
     from trajopt.pipeline import solve as solve_problem
     from trajopt.problem import load_problem
     from trajopt.report.tables import solution_table
@@ -63,9 +69,18 @@ def solve(
     optimizer = _of_plugin(optimizer, plugin)
     budget = _budget(evaluations, seconds, target)
     start = None if x0 is None else _searched(x0)
+    state = _state(out) if resume else None
+    if impossible := _impossible(loaded):
+        console.print(impossible, soft_wrap=True)
     with Bar(f"{optimizer}", None if budget is None else budget.evaluations) as bar:
         solution = solve_problem(
-            loaded, optimizer=optimizer, seed=seed, budget=budget, x0=start, progress=bar.update
+            loaded,
+            optimizer=optimizer,
+            seed=seed,
+            budget=budget,
+            x0=start,
+            state=state,
+            progress=bar.update,
         )
     console.print(solution_table(solution))
     if out is not None:
@@ -73,6 +88,9 @@ def solve(
     if not solution.holds:
         for fault in solution.faults:
             console.print(words(("does not hold:", "red"), f" {fault}"))
+    if solution.search is not None and solution.search.status is Status.INTERRUPTED:
+        raise typer.Exit(INTERRUPTED)
+    if not solution.holds:
         raise typer.Exit(FAULTY)
 
 
@@ -165,6 +183,21 @@ def _searched(folder: Path) -> Array:
     if search is None:
         raise ArgumentError("--x0", str(folder), "the folder of a search")
     return search.x
+
+
+def _state(out: Path | None) -> Path:
+    """The file of a search that can go on."""
+    if out is None:
+        raise ArgumentError("--resume", True, "--out with it: the search is saved there")
+    out.mkdir(parents=True, exist_ok=True)
+    return out / "search.npz"
+
+
+def _impossible(problem: Problem) -> str:
+    """Why no motion reaches the goal, where that is known before searching."""
+    from trajopt.solution import search_objective
+
+    return search_objective(problem).impossible() if problem.actuator is not None else ""
 
 
 def _of_plugin(optimizer: str, plugin: Path | None) -> str:

@@ -37,6 +37,7 @@ class _Output:
 console: Any = _Output()
 
 FAULTY = 1
+INTERRUPTED = 130  # as shells say it of Ctrl-C
 # What can be switched on in a physics check; None drives the planned wheel speeds.
 CONTROLS: dict[str, Mode | None] = {
     "none": None,

@@ -17,14 +17,22 @@ class Capability(Enum):
     RESIDUALS = auto()  # a vector that is zero at an exact solution
     SYMBOLIC = auto()  # the same formulas on symbolic arrays (CasADi)
     AFFINE = auto()  # critical residuals affine in the decision variables, modulo a period
+    JACOBIAN = auto()  # first derivatives of the constraints
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Costs and constraint violations (>= 0, 0 where feasible) of n candidates, each (n,)."""
+    """Costs and constraint violations (>= 0, 0 where feasible) of n candidates, each (n,).
+
+    An objective that hands over its constraints one by one also gives their values ``constraints``
+    (n, m) and between what they are kept, ``limits`` (2, m): equalities where both are equal, inf
+    where there is none. The violation is then computed from them, whatever it says here.
+    """
 
     cost: Array
     violation: Array
+    constraints: Array | None = None
+    limits: Array | None = None
 
 
 @dataclass(frozen=True)

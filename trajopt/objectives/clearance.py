@@ -49,18 +49,24 @@ class ClearObjective(OnTerminal):
     def _values(self) -> Array:
         return step_grid(self.terminal.basis, self.steps).node_value
 
-    def margins(self, candidates: Array) -> Array:
-        """(n,): least distance (m) from any border along the path of each candidate (n, d), search
-        grid."""
+    def rooms(self, candidates: Array) -> Array:
+        """(n, k): least distance (m) of each corner from each border (of the footprint from the
+        obstacles) along the path of each candidate (n, d), search grid."""
         points = self.terminal.control_points(np.asarray(candidates, dtype=np.float64).T)
         poses = (self._values @ points.x, self._values @ points.y, self._values @ points.yaw)
-        return np.asarray(self.ground.margin(*poses).min(axis=0))
+        rooms = self.ground.rooms(*poses) or [self.ground.margin(*poses)]
+        return np.stack([room.min(axis=0) for room in rooms], axis=1)
+
+    def margins(self, candidates: Array) -> Array:
+        """(n,): the least of all ``rooms``."""
+        return np.asarray(self.rooms(candidates).min(axis=1))
 
     def evaluate(self, candidates: Array) -> Evaluation:
-        inner = self.inner.evaluate(candidates)
-        return Evaluation(
-            inner.cost, inner.violation + np.maximum(RESERVE - self.margins(candidates), 0.0)
-        )
+        inner, rooms = self.inner.evaluate(candidates), self.rooms(candidates)
+        violation = inner.violation + np.maximum(RESERVE - rooms.min(axis=1), 0.0)
+        rows = np.column_stack([rooms, -inner.violation])
+        low = np.append(np.full(rooms.shape[1], RESERVE), 0.0)
+        return Evaluation(inner.cost, violation, rows, np.stack([low, np.full(len(low), np.inf)]))
 
     def score(self, candidate: Array) -> Evaluation:
         inner = self.inner.score(candidate)

@@ -30,6 +30,14 @@ class OnTerminal:
     def constrained(self) -> bool:
         return True
 
+    def prepare(self) -> None:
+        """Compile what evaluations use, which is no part of a search."""
+        self.terminal.prepare()
+
+    def impossible(self) -> str:
+        """Why no motion reaches the goal pose; empty where that is not proved."""
+        return self.terminal.impossible()
+
     def path(self, candidate: Array) -> Path:
         """The path through the control points of one candidate (d,)."""
         return self.terminal.path(candidate)

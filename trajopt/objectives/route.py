@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, Literal
 
 import numpy as np
 
-from trajopt.arrays import Array
+from trajopt.arrays import Array, IndexArray
 from trajopt.errors import InfeasibleError
 from trajopt.limits.limit import Limit
-from trajopt.objectives.base import Capability, Evaluation, SymbolicProblem
+from trajopt.objectives.base import Capability, Evaluation
 from trajopt.paths.path import Path
 from trajopt.paths.samples import along_tangent
 from trajopt.paths.spline import SplineBasis
@@ -28,9 +28,10 @@ from trajopt.timing.compiled import fastest_profiles
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import assemble
 
-SEARCH_STEPS = 160  # steps along the route for obstacles and walls, chosen: 8 cm on 12 m
+MOST_SIDES = 6  # obstacles whose two sides are told apart in starts, chosen: 64 routes
+SEARCH_STEPS = 200  # steps along the route for obstacles and walls, chosen: 6 cm on 12 m
 FINE_STEPS = 1600  # the same when a route is judged
-RESERVE = 0.004  # m, chosen: more than a disc of 1 m comes nearer between two search steps (sagitta of step and path)
+RESERVE = 2e-4  # m, chosen: more than a parabola through three search steps misses on calm routes
 SEARCH_CELLS = 60  # intervals of the speed profile in a search, chosen
 _STANDING = 1e-6  # of the mean rate: a slower place has no direction of travel
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(4)
@@ -84,9 +85,13 @@ class RouteObjective:
 
     @property
     def provides(self) -> frozenset[Capability]:
-        return frozenset(
-            {Capability.BATCH} | ({Capability.SYMBOLIC} if self.kind == "length" else set())
-        )
+        smooth = {Capability.GRADIENT} if self.kind == "length" else set()
+        kept = {Capability.JACOBIAN} if self.constrained else set()
+        return frozenset({Capability.BATCH} | smooth | kept)
+
+    def prepare(self) -> None:
+        """Compile what ``evaluate`` uses, which is no part of a search."""
+        self.evaluate(self.bounds.mean(axis=1)[None])
 
     def coordinates(self, z: Any) -> tuple[Any, Any]:
         """Control values of x and y, each (size, n), for decision variables (d, n): arrays or
@@ -141,20 +146,96 @@ class RouteObjective:
         """Cost and violation of candidates (n, d). Routes without a direction of travel cost
         inf."""
         x, y = self.coordinates(np.asarray(candidates, dtype=np.float64).T)
-        violation = self._depth(self._steps @ x, self._steps @ y, RESERVE)
         _, _, gauss, weights = self._cells
         rate = np.hypot(gauss @ x, gauss @ y)
-        if self.kind == "length":
-            return Evaluation(weights @ rate, violation)
-        return Evaluation(self._durations(x, y, rate), violation)
+        cost = weights @ rate if self.kind == "length" else self._durations(x, y, rate)
+        if not self.constrained:
+            return Evaluation(cost, np.zeros(len(cost)))
+        rooms = self._rooms(x, y)[0].T
+        limits = np.stack([np.full(rooms.shape[1], RESERVE), np.full(rooms.shape[1], np.inf)])
+        violation = np.maximum(RESERVE - rooms.min(axis=1), 0.0)
+        return Evaluation(cost, violation, rooms, limits)
 
-    def _depth(self, x: Array, y: Array, reserve: float) -> Array:
-        """(n,): how deep the disc is inside something, at the worst of the places in columns (k,
-        n), m."""
-        rooms = self.corridor.rooms(x, y, self.radius)
-        if not rooms:
-            return np.zeros(x.shape[1])
-        return np.asarray(np.maximum(reserve - np.min([r.min(axis=0) for r in rooms], axis=0), 0.0))
+    @cached_property
+    def _reach(self) -> Array:
+        """(m,): what squared distances and heights leave less of, m: of each obstacle and wall."""
+        found = [r for _, _, r in self.corridor.obstacles]
+        if self.corridor.y is not None:
+            found += [self.corridor.y[0], -self.corridor.y[1]]
+        return np.array(found) + self.radius
+
+    def _rooms(self, x: Array, y: Array) -> tuple[Array, IndexArray, Array]:
+        """Least room (m, n) of the disc to each obstacle and wall on routes with control values
+        (size, n), m; at which step it is, and the shares (3, m, n) of that step and its neighbours
+        in it.
+
+        Between steps, a parabola through three squared distances (heights over a wall) has it: the
+        least is smooth in the control values, and closer than a step.
+        """
+        px, py = self._steps @ x, self._steps @ y
+        measures = [(px - a) ** 2 + (py - b) ** 2 for a, b, _ in self.corridor.obstacles]
+        if self.corridor.y is not None:
+            measures += [py, -py]
+        q = np.array(measures)
+        at = np.clip(q.argmin(axis=1), 1, len(px) - 2)
+        near = np.stack([np.take_along_axis(q, at[:, None] + k, axis=1)[:, 0] for k in (-1, 0, 1)])
+        bend, fall = near[0] - 2 * near[1] + near[2], near[0] - near[2]
+        t = np.where(bend > 0, 0.5 * fall / np.where(bend > 0, bend, 1.0), np.sign(fall))
+        t = np.clip(t, -1.0, 1.0)
+        shares = np.stack([0.5 * t * (t - 1), 1 - t * t, 0.5 * t * (t + 1)])
+        least = (shares * near).sum(axis=0)
+        n = len(self.corridor.obstacles)
+        least[:n] = np.sqrt(np.maximum(least[:n], 0.0))
+        return least - self._reach[:, None], at, shares
+
+    def starts(self) -> Array:
+        """(k, d): routes that pass the obstacles on either side of each, where local searches may
+        begin; of the nearest MOST_SIDES obstacles where there are more."""
+        start, goal = self.values[0], self.values[-1]
+        along = (goal - start) / max(float(np.hypot(*(goal - start))), 1e-300)
+        across = np.array([-along[1], along[0]])
+        discs = [(np.array(o[:2]) - start, o[2] + self.radius) for o in self.corridor.obstacles]
+        places = [(float(p @ along), float(p @ across), r) for p, r in discs]
+        places = sorted(sorted(places, key=lambda o: abs(o[1]) - o[2])[:MOST_SIDES])
+        at = np.array([0.0, *(p for p, _, _ in places), float((goal - start) @ along)])
+        knots = self.values[list(self.free)]
+        found = []
+        for sides in product((1.0, -1.0), repeat=len(places)):
+            beside = [s * max(0.0, s * y + r) for s, (_, y, r) in zip(sides, places, strict=True)]
+            off = np.interp((knots - start) @ along, at, [0.0, *beside, 0.0])
+            line = start + ((knots - start) @ along)[:, None] * along
+            found.append((line + off[:, None] * across).ravel())
+        return np.asarray(np.clip(found, *self.bounds.T))
+
+    # -- derivatives
+
+    def gradient(self, candidate: Array) -> Array:
+        """(d,): of the length."""
+        x, y = self.coordinates(np.asarray(candidate, dtype=np.float64)[:, None])
+        _, _, gauss, weights = self._cells
+        dx, dy = gauss @ x[:, 0], gauss @ y[:, 0]
+        share = weights / np.maximum(np.hypot(dx, dy), 1e-300)
+        return self._of_variables((share * dx) @ gauss, (share * dy) @ gauss)
+
+    def jacobian(self, candidate: Array) -> Array:
+        """(m, d): of the room to each obstacle and wall."""
+        x, y = self.coordinates(np.asarray(candidate, dtype=np.float64)[:, None])
+        rooms, at, shares = self._rooms(x, y)
+        n = len(self.corridor.obstacles)
+        basis = self._steps[at[:, 0] + np.array([-1, 0, 1])[:, None]]  # (3, m, size)
+        distance = np.maximum(rooms[:n, 0] + self._reach[:n], 1e-300)
+        slopes = np.zeros((2, len(rooms), basis.shape[-1]))
+        for axis, values in enumerate((x[:, 0], y[:, 0])):
+            centre = np.array([o[axis] for o in self.corridor.obstacles])
+            off = (basis[:, :n] @ values - centre) * shares[:, :n, 0] / distance
+            slopes[axis, :n] = (off[..., None] * basis[:, :n]).sum(axis=0)
+        sign = np.array([1.0, -1.0])[: len(rooms) - n]
+        slopes[1, n:] = ((shares[:, n:, 0] * sign)[..., None] * basis[:, n:]).sum(axis=0)
+        return np.moveaxis(slopes[..., list(self.free)], 0, -1).reshape(len(rooms), -1)
+
+    def _of_variables(self, dx: Array, dy: Array) -> Array:
+        """(d,): the slopes over control values (size,) of the free ones, x and y in turn."""
+        return np.column_stack([dx, dy])[list(self.free)].ravel()
 
     def _durations(self, x: Array, y: Array, rate: Array) -> Array:
         """(n,): least durations (s) on the search grid, rows of all limits for all candidates at
@@ -192,7 +273,8 @@ class RouteObjective:
         """Cost of the path itself and violation on a grid ten times finer, without reserve."""
         path = self.path(candidate)
         p = path.position(np.linspace(path.start, path.end, FINE_STEPS + 1))
-        depth = self._depth(p[:, :1], p[:, 1:2], 0.0)
+        rooms = self.corridor.rooms(p[:, 0], p[:, 1], self.radius)
+        depth = np.array([max(0.0, -float(np.min(rooms, initial=np.inf)))])
         if self.kind == "length":
             return Evaluation(np.array([path.length]), depth)
         if not path.length > 0:
@@ -207,26 +289,3 @@ class RouteObjective:
     def terms(self, candidate: Array) -> dict[str, float]:
         """The cost by name: length (m) or duration (s)."""
         return {self.kind: float(self.score(candidate).cost[0])}
-
-    # -- the length on symbols
-    # --------------------------------------------------------------------------
-
-    def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:  # noqa: ARG002 - the protocol's signature
-        """Least length with room >= reserve to every obstacle and wall at every search step."""
-        x, y = self.coordinates(z)
-        _, _, gauss, weights = self._cells
-        cost = np.sum(weights[:, None] * np.sqrt((gauss @ x) ** 2 + (gauss @ y) ** 2))
-        rooms = self.corridor.rooms(self._steps @ x, self._steps @ y, self.radius)
-        count = len(rooms) * (SEARCH_STEPS + 1)
-        return SymbolicProblem(
-            cost,
-            np.vstack(rooms) if rooms else None,
-            np.full(count, RESERVE),
-            np.full(count, np.inf),
-        )
-
-    def parameters_at(self, start: Array) -> Array:  # noqa: ARG002
-        return np.zeros(0)
-
-    def slacks_at(self, start: Array) -> Array:  # noqa: ARG002
-        return np.zeros(0)

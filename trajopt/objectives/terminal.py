@@ -19,6 +19,7 @@ from trajopt.arrays import Array, fold
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import AffinePart, Capability, Evaluation, SymbolicProblem
 from trajopt.objectives.exact import exact_terminal
+from trajopt.objectives.reach import impossible
 from trajopt.objectives.rollout import Kinematics, Terminal, roll_out, step_grid, wheel_travel
 from trajopt.objectives.variables import TerminalVariables
 from trajopt.problem import Problem
@@ -56,14 +57,16 @@ class TerminalObjective(TerminalVariables):
 
     @property
     def provides(self) -> frozenset[Capability]:
-        always = {Capability.BATCH, Capability.RESIDUALS, Capability.SYMBOLIC}
-        return frozenset(
-            always | ({Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set())
-        )
+        some = {Capability.AFFINE, Capability.GRADIENT} if self.is_affine else set()
+        return frozenset({Capability.BATCH, Capability.RESIDUALS, Capability.SYMBOLIC} | some)
 
     @property
     def constrained(self) -> bool:
         return False
+
+    def impossible(self) -> str:
+        """Why no motion reaches the goal pose, and what would do; empty where none is proved."""
+        return impossible(self)
 
     # -- cost --------------------------------------------------------------------------------------
 
@@ -79,10 +82,8 @@ class TerminalObjective(TerminalVariables):
 
     def predict_readable(self, z: Any) -> Terminal:
         """The same by ``roll_out``: what the compiled prediction is tested against."""
-        points, grid = self.control_points(z), step_grid(self.basis, self.steps)
-        return roll_out(
-            grid, self.model, self.actuator, points.x, points.y, points.yaw, points.duration
-        )
+        p, grid = self.control_points(z), step_grid(self.basis, self.steps)
+        return roll_out(grid, self.model, self.actuator, p.x, p.y, p.yaw, p.duration)
 
     def predict_exactly(self, candidate: Array) -> Terminal:
         """Final state of one candidate (d,), free of grid error."""
@@ -158,6 +159,11 @@ class TerminalObjective(TerminalVariables):
             plan, goal = self._compiled
             return Evaluation(plan.cost(candidates, goal), np.zeros(len(candidates)))
         return self.evaluate_readable(candidates)
+
+    def prepare(self) -> None:
+        """Compile what ``evaluate`` and ``score`` use, which is no part of a search."""
+        self.evaluate(self.default[None])
+        self.score(self.default)
 
     def evaluate_readable(self, candidates: Array) -> Evaluation:
         """The same from the named terms: what compiled and affine short cuts are tested against."""

@@ -1,36 +1,30 @@
-"""The contract every optimizer fulfils, and the recorder that enforces it.
+"""The contract every optimizer fulfils: budget, result, statuses, and Deb's feasibility rule.
 
-An optimizer is a frozen dataclass of options with one method, ``minimize``. It never touches the
-objective itself, only through a ``Run``, which keeps every optimizer to the same bounds, budget and
-bookkeeping: it counts evaluations, keeps the history and the best candidate (Deb's feasibility
-rule), treats an objective that raises or returns NaN as infeasible, and ends the search when the
-budget is used up.
+An optimizer is a frozen dataclass of options with one method, ``search``. It touches its objective
+only through a ``Run`` (``optimize.run``), which keeps every optimizer to the same bounds, budget
+and bookkeeping.
 """
 
 from __future__ import annotations
 
-import math
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Literal, NoReturn, Protocol
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, BoolArray, IntArray, as_numbers, require_positive, require_whole
+from trajopt.arrays import Array, IntArray, as_numbers, require_positive, require_whole
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import Capability, Evaluation, Objective
+from trajopt.objectives.base import Capability
 from trajopt.shown import Shown
 
-FEASIBLE = 1e-9  # violation up to which a candidate counts as feasible (rounding), chosen
+if TYPE_CHECKING:
+    from trajopt.optimize.run import Run
+
+FEASIBLE = 1e-8  # violation up to which a candidate counts as feasible (rounding), chosen
 DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, [guzman2015] Table 5.8
-_KEPT_SAMPLES = 50_000  # explored candidates kept for pictures
-
-
-Progress = Callable[[int, float], None]  # called with evaluations used and the best cost
 
 
 class Status(Enum):
@@ -43,6 +37,8 @@ class Status(Enum):
     SECONDS = "the budget of seconds is used up; raise Budget.seconds to search longer"
     INFEASIBLE = "no feasible candidate was found; widen the bounds or free more variables"
     FAILED = "the objective gave no finite cost anywhere it was asked; check the objective at x0"
+    INTERRUPTED = "interrupted; the best so far is returned: start from its x, or from a saved state, to go on"
+    CALLBACK = "ended by the callback; the best so far is returned"
     NO_EXACT = "no exact solution was found inside the bounds; the best feasible one is returned; free more variables"
 
 
@@ -129,292 +125,44 @@ class OptimizeResult(Shown):
 
 class Optimizer(Protocol):
     """A search method. ``needs`` lists what it asks of an objective; ``stochastic`` whether seeds
-    matter."""
+    matter.
 
-    @property
-    def name(self) -> str: ...
+    ``only_bounds`` (False where absent) says that it cannot handle constraints; ``saves`` (False
+    where absent) that ``state=`` can save and resume it.
+    """
 
-    @property
-    def needs(self) -> frozenset[Capability]: ...
+    name: ClassVar[str]
+    needs: ClassVar[frozenset[Capability]]
+    stochastic: ClassVar[bool]
 
-    @property
-    def stochastic(self) -> bool: ...
-
-    def minimize(
-        self,
-        objective: Objective,
-        bounds: ArrayLike,
-        *,
-        x0: ArrayLike | None = None,
-        rng: Generator,
-        budget: Budget,
-        progress: Progress | None = None,
-    ) -> OptimizeResult: ...
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        """Search from ``x0`` (d,) or from a start of its own until done, by ``run.evaluate`` alone;
+        the status and what to say of it. The run ends the search where the budget ends."""
+        ...
 
 
-class _Stop(Exception):
-    def __init__(self, status: Status) -> None:
-        self.status = status
+class Stop(Exception):
+    """Ends the search: raised inside the run, and caught by it."""
+
+    def __init__(self, status: Status, said: str = "") -> None:
+        super().__init__(said or status.value)
+        self.status, self.said = status, said
 
 
-@dataclass
-class Run:
-    """One search: the only way from an optimizer to its objective. Mutable by nature; lives for one
-    search."""
-
-    objective: Objective
-    bounds: Array
-    budget: Budget
-    on_progress: Progress | None = None
-    nfev: int = 0
-    nit: int = 0
-    ngev: int = 0
-    nhev: int = 0
-    construct_seconds: float = 0.0
-    failures: int = 0
-    first_failure: str = ""
-    best_x: Array | None = None
-    best_cost: float = np.inf
-    best_violation: float = np.inf
-    _proposals: list[Array] = field(default_factory=list)
-    _rows: list[tuple[int, float, float, float]] = field(default_factory=list)
-    _samples: list[Array] = field(default_factory=list)
-    _kept: int = 0
-    _started: float = 0.0
-
-    def __post_init__(self) -> None:
-        self._started = self._now()
-
-    # -- evaluating
-    # -----------------------------------------------------------------------------------
-
-    def evaluate(self, candidates: Array, *, inside: bool = False) -> Evaluation:
-        """Cost and violation of candidates (n, d); the distance outside the bounds adds to the
-        violation.
-
-        ``inside`` says that all are within the bounds, which saves looking. Ends the search (by an
-        exception the run catches itself) when the budget is used up or the target met.
-        """
-        candidates = np.ascontiguousarray(candidates, dtype=np.float64)
-        wanted = len(candidates)
-        if self.budget.evaluations is not None:
-            candidates = candidates[: self.budget.evaluations - self.nfev]
-        if len(candidates) == 0:
-            self.stop(Status.EVALUATIONS)
-        result = self._guarded(candidates)
-        violation, low, high = result.violation, self.bounds[:, 0], self.bounds[:, 1]
-        if not inside and ((candidates < low).any() or (candidates > high).any()):
-            outside = np.maximum(low - candidates, candidates - high)
-            violation = violation + np.maximum(outside, 0.0).sum(axis=1)
-        self._record(candidates, result.cost, violation)
-        if (
-            self.budget.target is not None
-            and self.best_violation <= FEASIBLE
-            and self.best_cost <= self.budget.target
-        ):
-            self.stop(Status.TARGET)
-        if len(candidates) < wanted:
-            self.stop(Status.EVALUATIONS)
-        if self.budget.seconds is not None and self.elapsed >= self.budget.seconds:
-            self.stop(Status.SECONDS)
-        return Evaluation(result.cost, violation)
-
-    def cost(self, candidate: Array) -> float:
-        """Cost of one candidate (d,)."""
-        return float(self.evaluate(np.asarray(candidate, dtype=np.float64)[None]).cost[0])
-
-    def _guarded(self, candidates: Array) -> Evaluation:
-        """The objective's answer, with everything that is not a finite number turned into
-        "infeasible"."""
-        try:
-            result = self.objective.evaluate(candidates.copy())
-            cost = np.array(result.cost, dtype=np.float64)
-            violation = np.array(result.violation, dtype=np.float64)
-            if cost.shape != (len(candidates),) or violation.shape != cost.shape:
-                raise ValueError(
-                    f"objective returned shape {cost.shape} for {len(candidates)} candidates"
-                )
-        except (KeyboardInterrupt, SystemExit, _Stop):
-            raise
-        except Exception as error:  # whatever a user's objective raises counts as infeasible
-            if len(candidates) > 1:
-                parts = [self._guarded(row[None]) for row in candidates]
-                return Evaluation(
-                    np.concatenate([p.cost for p in parts]),
-                    np.concatenate([p.violation for p in parts]),
-                )
-            return self._failed(
-                np.full(1, np.inf),
-                np.full(1, np.inf),
-                np.ones(1, bool),
-                f"{type(error).__name__}: {error}",
-            )
-        if math.isfinite(
-            np.add.reduce(cost) + np.add.reduce(violation)
-        ):  # then each is; the usual case, quick
-            return Evaluation(cost, violation)
-        bad = ~(np.isfinite(cost) & np.isfinite(violation))
-        if bad.any():
-            worst = cost[np.argmax(bad)]
-            return self._failed(
-                cost, violation, bad, f"cost {worst} at {candidates[np.argmax(bad)].tolist()}"
-            )
-        return Evaluation(cost, violation)
-
-    def _failed(self, cost: Array, violation: Array, bad: BoolArray, reason: str) -> Evaluation:
-        self.failures += int(bad.sum())
-        self.first_failure = self.first_failure or reason
-        return Evaluation(np.where(bad, np.inf, cost), np.where(bad, np.inf, violation))
-
-    def _record(self, candidates: Array, cost: Array, violation: Array) -> None:
-        before = self.nfev
-        self.nfev += len(candidates)
-        if self._kept < _KEPT_SAMPLES:
-            part = candidates[: _KEPT_SAMPLES - self._kept]
-            self._samples.append(part)
-            self._kept += len(part)
-        i = best_index(cost, violation)
-        if better(cost[i], violation[i], self.best_cost, self.best_violation):
-            self.best_cost, self.best_violation = float(cost[i]), float(violation[i])
-            self.best_x = candidates[i].copy()
-            self._rows.append((before + i + 1, self.elapsed, self.best_cost, self.best_violation))
-        if self.on_progress is not None:
-            self.on_progress(self.nfev, self.best_cost)
-
-    def spend(self, evaluations: int) -> None:
-        """Count work on the objective that does not go through ``evaluate`` (residuals), before it
-        is done.
-
-        Ends the search where the budget does not hold it.
-        """
-        if evaluations > self.remaining():
-            self.stop(Status.EVALUATIONS)
-        self.nfev += evaluations
-        if self.budget.seconds is not None and self.elapsed >= self.budget.seconds:
-            self.stop(Status.SECONDS)
-
-    def propose(self, candidate: Array) -> None:
-        """Enter a candidate (d,) into the final judgement, whatever its cost on the search grid
-        is."""
-        self._proposals.append(np.clip(candidate, self.bounds[:, 0], self.bounds[:, 1]))
-
-    def constructed(self) -> None:
-        """Start the clock anew: what went before was construction, which is told apart from the
-        search."""
-        self.construct_seconds = self.elapsed
-        self._started = self._now()
-
-    @property
-    def elapsed(self) -> float:
-        """Seconds since the search began, by the budget's clock."""
-        return self._now() - self._started
-
-    def _now(self) -> float:
-        return time.perf_counter() if self.budget.clock == "wall" else time.process_time()
-
-    def remaining(self) -> int:
-        """Evaluations left (a large number when unlimited)."""
-        return (2**62 if self.budget.evaluations is None else self.budget.evaluations) - self.nfev
-
-    def stop(self, status: Status) -> NoReturn:
-        """End the search now."""
-        raise _Stop(status)
-
-    def _judged(self) -> tuple[Array, float, float]:
-        """The best candidate by the objective's own fine score, with its cost and violation."""
-        found = (
-            []
-            if self.best_x is None
-            else [np.clip(self.best_x, self.bounds[:, 0], self.bounds[:, 1])]
-        )
-        best = (self.bounds.mean(axis=1), np.inf, np.inf)
-        for x in [*found, *self._proposals]:
-            try:
-                scored = self.objective.score(x)
-            except Exception as error:  # a user's objective may raise here as anywhere
-                self.failures += 1
-                self.first_failure = self.first_failure or f"{type(error).__name__}: {error}"
-                continue
-            if better(scored.cost[0], scored.violation[0], best[1], best[2]):
-                best = (x, float(scored.cost[0]), float(scored.violation[0]))
-        return best
-
-    # -- finishing
-    # ------------------------------------------------------------------------------------
-
-    def finish(self, optimizer: str, search: Callable[[], tuple[Status, str]]) -> OptimizeResult:
-        """Run ``search`` to its end or the budget's, then judge the best candidate anew."""
-        try:
-            status, message = search()
-        except _Stop as stop:
-            status, message = stop.status, ""
-        x, fun, violation = self._judged()
-        if not np.isfinite(fun):
-            status = Status.FAILED
-        if status is not Status.FAILED and not violation <= FEASIBLE:
-            status = Status.INFEASIBLE
-        text = f"{message}: {status.value}" if message else status.value
-        if self.failures:
-            text += f" ({self.failures} evaluations failed; the first: {self.first_failure})"
-        rows = np.array(self._rows, dtype=np.float64).reshape(-1, 4)
-        history = History(
-            rows[:, 0].astype(np.int64),
-            rows[:, 1],
-            rows[:, 2],
-            rows[:, 3],
-            np.concatenate(self._samples) if self._samples else np.zeros((0, len(self.bounds))),
-        )
-        return OptimizeResult(
-            x,
-            fun,
-            violation,
-            self.best_cost,
-            self.nfev,
-            self.nit,
-            status in (Status.TARGET, Status.CONVERGED),
-            status,
-            text,
-            optimizer,
-            history,
-            self.elapsed,
-            self.failures,
-            self.first_failure,
-            self.ngev,
-            self.nhev,
-            self.construct_seconds,
-        )
+class StageOver(Stop):
+    """Ends one stage of a search, whose share of the budget is used up."""
 
 
-@dataclass
-class Starts:
-    """Which start of a local method gave the best candidate, and what the method said of it."""
-
-    run: Run
-    converged: bool = False
-    said: str = "nothing was found"
-    tried: int = 0
-    kept: int = 0  # starts that converged
-    _best: tuple[float, float] = (np.inf, np.inf)
-
-    def ended(self, converged: bool, said: str) -> None:
-        """A start is over; the method says whether by its own stopping rule, and what."""
-        self.tried += 1
-        self.kept += converged
-        now = self.run.best_cost, self.run.best_violation
-        if self.tried == 1 or better(*now, *self._best):
-            self.converged, self.said = converged, said.strip().rstrip(".")
-        self._best = now
-
-    def verdict(self) -> tuple[Status, str]:
-        """The status of the start that found the best, and a sentence on all."""
-        status = Status.CONVERGED if self.converged else Status.STALLED
-        return status, f"{self.kept} of {self.tried} starts converged; the best said '{self.said}'"
-
-
-def better(cost: float, violation: float, than_cost: float, than_violation: float) -> bool:
+def better(
+    cost: float,
+    violation: float,
+    than_cost: float,
+    than_violation: float,
+    level: float = FEASIBLE,
+) -> bool:
     """Deb's feasibility rule [deb2000]: feasible before infeasible, then the cost, or else the
-    violation, decides."""
-    feasible, than_feasible = violation <= FEASIBLE, than_violation <= FEASIBLE
+    violation, decides. Violations up to ``level`` count as none (epsilon levels [takahama2006])."""
+    feasible, than_feasible = violation <= level, than_violation <= level
     if feasible and than_feasible:
         return bool(cost < than_cost)
     if feasible or than_feasible:
@@ -422,11 +170,11 @@ def better(cost: float, violation: float, than_cost: float, than_violation: floa
     return bool(violation < than_violation or (violation == than_violation and cost < than_cost))
 
 
-def best_index(cost: Array, violation: Array) -> int:
-    """Index of the best candidate under Deb's rule."""
+def best_index(cost: Array, violation: Array, level: float = FEASIBLE) -> int:
+    """Index of the best candidate as ``better`` sees it."""
     if not np.count_nonzero(violation):  # the usual case, and quick
         return int(cost.argmin())
-    feasible = violation <= FEASIBLE
+    feasible = violation <= level
     if feasible.any():
         return int(np.argmin(np.where(feasible, cost, np.inf)))
     return int(np.lexsort((cost, violation))[0])
@@ -455,6 +203,8 @@ def checked_x0(x0: ArrayLike | None, bounds: Array) -> Array | None:
     point = as_numbers("x0", x0, f"{len(bounds)} finite numbers")
     if point.shape != (len(bounds),) or not np.all(np.isfinite(point)):
         raise ArgumentError("x0", point.tolist(), f"{len(bounds)} finite numbers")
-    if np.any(point < bounds[:, 0]) or np.any(point > bounds[:, 1]):
+    # A start is on a bound if it is but for rounding: 0.1 + 0.2 at a bound of 0.3.
+    rounding = 1e-12 * (np.abs(bounds).max(axis=1) + bounds[:, 1] - bounds[:, 0])
+    if np.any(point < bounds[:, 0] - rounding) or np.any(point > bounds[:, 1] + rounding):
         raise ArgumentError("x0", point.tolist(), f"a point inside the bounds {bounds.tolist()}")
-    return point
+    return np.clip(point, bounds[:, 0], bounds[:, 1])

@@ -1,95 +1,179 @@
-"""Plain Python functions as objectives."""
+"""Plain functions as objectives: costs, gradients and constraints as SciPy's users write them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import Capability, Evaluation, Objective, SymbolicProblem
+from trajopt.objectives.base import Capability, Evaluation, Objective
+from trajopt.optimize.constraints import (
+    Constraint,
+    constraint,
+    constraint_list,
+    numbers,
+    of_casadi,
+)
+
+_PROBED = 3  # candidates handed over together to see whether a function takes batches, chosen
 
 
-@dataclass(frozen=True)
+@dataclass
 class FunctionObjective:
     """``function`` of d variables: one candidate (d,) -> number, or, with ``batch``, (n, d) ->
-    (n,)."""
+    (n,).
 
-    function: Callable[[Any], Any]
+    ``batch`` None is for a run to find out (``settled``). ``gradient_of`` maps a candidate to the
+    gradient (d,); True means that ``function`` returns (cost, gradient).
+    """
+
+    function: Callable[..., Any]
     dimension: int
-    batch: bool = False
+    batch: bool | None = False
+    arguments: tuple[Any, ...] = ()
+    gradient_of: Callable[..., Any] | bool | None = None
+    constraints: tuple[Constraint, ...] = ()
+    exact = True  # a search sees all there is: the score needs no call of its own
+    doubt: bool = field(default=False, repr=False)  # a single candidate failed
+    _limits: Array | None = field(default=None, repr=False)
 
     @property
     def provides(self) -> frozenset[Capability]:
-        # A scalar function may also run on symbols; the symbolic optimizer finds out and says so if
-        # not.
-        return frozenset({Capability.BATCH} if self.batch else {Capability.SYMBOLIC})
+        found = {Capability.BATCH} if self.batch else set()
+        if self.gradient_of:
+            found.add(Capability.GRADIENT)
+        if self.constraints and all(c.jacobian is not None for c in self.constraints):
+            found.add(Capability.JACOBIAN)
+        return frozenset(found)
+
+    @property
+    def constrained(self) -> bool:
+        return bool(self.constraints)
 
     def evaluate(self, candidates: Array) -> Evaluation:
         if self.batch:
-            cost = np.asarray(self.function(candidates), dtype=np.float64)
+            cost = numbers(self.function(candidates, *self.arguments), "the objective")
         else:
-            cost = np.array([_number(self.function(row)) for row in candidates])
-        return Evaluation(cost, np.zeros(cost.shape))
+            cost = np.array([self.cost(row) for row in candidates])
+        free = np.zeros(cost.shape)
+        if not self.constraints:
+            return Evaluation(cost, free)
+        found = [[c.values(row) for c in self.constraints] for row in candidates]
+        values = np.array([np.concatenate(row) for row in found])
+        if self._limits is None or self._limits.shape[1] != values.shape[1]:
+            parts = [c.limits(len(v)) for c, v in zip(self.constraints, found[0], strict=True)]
+            self._limits = np.concatenate(parts, axis=1)
+        return Evaluation(cost, free, values, self._limits)
+
+    def cost(self, x: Array) -> float:
+        """Cost of one candidate (d,)."""
+        try:
+            told = self.function(x, *self.arguments)
+            return _number(told[0] if self.gradient_of is True else told)
+        except Exception:
+            self.doubt = self.batch is None
+            raise
 
     def score(self, candidate: Array) -> Evaluation:
         return self.evaluate(candidate[None])
 
-    @property
-    def constrained(self) -> bool:
-        return False
+    def gradient(self, x: Array) -> Array:
+        """(d,): gradient of the cost, where one was given."""
+        if self.gradient_of is True:
+            return numbers(self.function(x, *self.arguments)[1], "the gradient")
+        assert callable(self.gradient_of)
+        return numbers(self.gradient_of(x, *self.arguments), "the gradient")
 
-    def symbolic(self, z: Any, parameters: Any) -> SymbolicProblem:  # noqa: ARG002 - the protocol's signature
-        """The function on a symbolic vector (d,)."""
-        return SymbolicProblem(self.function(z), None, np.zeros(0), np.zeros(0))
+    def jacobian(self, x: Array) -> Array:
+        """(m, d): gradients of the constraints, where all were given."""
+        parts = [
+            numbers(c.jacobian(x), "a constraint's Jacobian").reshape(-1, len(x))
+            for c in self.constraints
+            if c.jacobian is not None
+        ]
+        return np.concatenate(parts)
 
-    def parameters_at(self, start: Array) -> Array:  # noqa: ARG002
-        return np.zeros(0)
 
-    def slacks_at(self, start: Array) -> Array:  # noqa: ARG002
-        return np.zeros(0)
-
-
-def as_objective(objective: Objective | Callable[[Any], Any], bounds: Array) -> Objective:
-    """The objective itself, or a plain function wrapped as one.
-
-    A function counts as a batch function when it maps three different points (3, d) to three
-    numbers (3,) that agree with what it gives for single points, or when it cannot take single
-    points at all. Raises ArgumentError for what cannot be called.
-    """
+def as_objective(
+    objective: Any,
+    bounds: Array,
+    *,
+    jac: Any = None,
+    constraints: Any = (),
+    args: tuple[Any, ...] = (),
+    batch: bool | None = None,
+) -> Objective:
+    """The objective itself, or a plain function (or a function or expression of CasADi) wrapped as
+    one. Raises ArgumentError for what cannot be called or used."""
+    items = constraint_list(constraints)
     if isinstance(objective, Objective):
+        for name, value in (("jac", jac), ("constraints", items or None), ("args", args or None)):
+            if value is not None:
+                expected = "none: this objective brings its own"
+                raise ArgumentError(name, value, expected)
         return objective
-    if not callable(objective):
-        raise ArgumentError(
-            "objective", objective, "an objective (objectives.base.Objective) or a function"
+    if any(map(of_casadi, [objective, *items])):
+        from trajopt.optimize.symbols import casadi_callable
+
+        symbols = [v for v in [objective, *items] if of_casadi(v)]
+        objective, *items = (
+            casadi_callable(v, len(bounds), symbols) if of_casadi(v) else v
+            for v in (objective, *items)
         )
-    d = len(bounds)
-    return FunctionObjective(objective, d, batch=_is_batch(objective, bounds))
+    if not callable(objective):
+        expected = "an objective (objectives.base.Objective) or a function"
+        raise ArgumentError("objective", objective, expected)
+    jac = getattr(objective, "gradient", None) if jac is None else jac
+    if not (jac is None or isinstance(jac, bool) or callable(jac)):
+        raise ArgumentError("jac", jac, "a function that gives the gradient (d,), True or None")
+    found = tuple(constraint(item) for item in items)
+    # A gradient or constraints are given for single candidates: then the cost is too.
+    single = bool(jac or found)
+    return FunctionObjective(
+        objective, len(bounds), False if single else batch, args, jac or None, found
+    )
 
 
-def _is_batch(function: Callable[[Any], Any], bounds: Array) -> bool:
-    n = len(bounds) + 2  # differs from d, so that a function that sums over the wrong axis shows it
-    inside = bounds[:, 0] + (bounds[:, 1] - bounds[:, 0]) * np.linspace(0.3, 0.7, n)[:, None]
+def settled(
+    function: FunctionObjective, rows: Array, allowed: int, late: Callable[[], bool]
+) -> int:
+    """Find out whether a function takes batches (n, d), by candidates that are to be evaluated
+    anyway; how many evaluations that took, at most ``allowed``.
+
+    It does where it maps two or three candidates to as many numbers that agree with what it gives
+    for single ones, or where it cannot take single ones at all.
+    """
+    some = rows[: 2 if function.dimension == _PROBED else _PROBED]
+    if len(rows) == 1 and not function.doubt:
+        return 0
+    if allowed < len(some) + 2 and not (function.doubt and allowed > 1):
+        return 0
     try:
-        together = np.asarray(function(inside.copy()), dtype=np.float64)
+        together = numbers(function.function(some.copy(), *function.arguments), "the objective")
     except Exception:  # a scalar function may fail in any way on a matrix
-        return False
-    if together.shape != (n,):
-        return False
+        together = np.zeros(0)
+    if together.shape != (len(some),):
+        function.batch = False
+        return 1
+    spent = len(some)
     try:
-        single = [_number(function(row.copy())) for row in inside]
+        for i in () if function.doubt else (0, len(some) - 1):
+            function.batch, spent = False, spent + 1
+            told = _number(function.function(some[i].copy(), *function.arguments))
+            if not np.isclose(told, together[i], rtol=1e-9, atol=1e-12, equal_nan=True) or late():
+                return spent
     except Exception:  # a batch function may fail in any way on one point
-        return True
-    return bool(np.allclose(single, together, rtol=1e-9, atol=1e-12, equal_nan=True))
+        pass
+    function.batch = True
+    return spent
 
 
 def _number(value: Any) -> float:
-    if np.iscomplexobj(value):
-        raise ValueError(f"the objective returned the complex number {value}; expected a real one")
-    array = np.asarray(value, dtype=np.float64)
+    array = numbers(value, "the objective")
     if array.size != 1:
         raise ValueError(
             f"the objective returned shape {array.shape} for one candidate; expected a number"

@@ -10,29 +10,21 @@ from numpy.random import Generator
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
-from trajopt.optimize.base import (
-    Run,
-    Status,
-)
-from trajopt.optimize.method import Method
+from trajopt.optimize.base import Status
+from trajopt.optimize.run import Run
 
 
 @dataclass(frozen=True)
-class Given(Method):
+class Given:
     """Evaluates ``x0`` and returns it."""
 
     name: ClassVar[str] = "given"
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = False
 
-    def _search(
-        self,
-        run: Run,
-        x0: Array | None,
-        rng: Generator,  # noqa: ARG002 - the contract has it
-    ) -> tuple[Status, str]:
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:  # noqa: ARG002
+        """The result at ``x0``. Raises ArgumentError without one."""
         if x0 is None:
-            count = run.objective.dimension
-            raise ArgumentError("x0", None, f"the candidate to judge, {count} numbers")
+            raise ArgumentError("x0", None, f"the candidate to judge, {len(run.bounds)} numbers")
         run.evaluate(x0[None])
         return Status.CONVERGED, "given, not searched"

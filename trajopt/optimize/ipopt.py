@@ -1,17 +1,15 @@
-"""CasADi and IPOPT behind the package's contract: exact first and second derivatives of the same
-formulas.
+"""IPOPT behind the package's contract: interior points with derivatives as exact as there are.
 
-The objective's NumPy formulas run on CasADi symbols (CasADi's NumPy mode), so physics exists once.
-Whole turns are parameters of the program, fixed at each start to the nearest ones; starts are
-lattice points where the objective has a lattice, then x0, then seeded random points. A Newton
-polish on the residuals makes the result exact where the objective has residuals. The only module
-that imports casadi.
+Objectives with the capability SYMBOLIC are written in symbols once, plain functions where they run
+on symbols: then first and second derivatives are exact. Otherwise first derivatives are the
+objective's own or the run's differences, and IPOPT approximates the second. Each evaluation is one
+of the run's, which stops IPOPT at any of them. Whole turns of a terminal objective are parameters
+of the program, fixed at each start to the nearest ones.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast
 
@@ -19,77 +17,81 @@ import numpy as np
 from numpy.random import Generator
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError
 from trajopt.objectives.base import (
     Capability,
     LatticeObjective,
     ResidualObjective,
     SymbolicObjective,
-    SymbolicProblem,
 )
-from trajopt.optimize.base import (
-    FEASIBLE,
-    Run,
-    Starts,
-    Status,
-)
+from trajopt.optimize.base import Status, Stop
+from trajopt.optimize.derivatives import NoGradient, onto_constraints
+from trajopt.optimize.functions import FunctionObjective
 from trajopt.optimize.lattice import EXACT, has_influence, lattice_points
-from trajopt.optimize.method import Method
 from trajopt.optimize.newton import solve_residuals
+from trajopt.optimize.nlp import Nlp
+from trajopt.optimize.run import Run
+from trajopt.optimize.starts import Starts, starting_points
+from trajopt.optimize.symbols import Expressions, expressions, function_in_symbols, values_of
+
+_LARGE = 1e100  # stands for an infeasible evaluation
+_BY_DIFFERENCES = 1e-7  # least tolerance where derivatives carry rounding, chosen
 
 
 @dataclass(frozen=True)
-class Ipopt(Method):
-    """IPOPT from several starts, on objectives that can be written in symbols.
+class Ipopt:
+    """IPOPT from several starts: x0 or the middle, then random points.
 
-    ``nfev`` counts IPOPT's cost and constraint calls, one each iteration for the history, and the
-    polish; ``ngev`` and ``nhev`` count its gradients and Hessians.
-
-    ``starts``: number of starts in all. ``lattice_starts``: how many of them may be lattice points.
-    ``polish``: Newton on the residuals after each start. ``stop_when_exact``: skip the remaining
-    starts once the cost is below 1e-9. ``tolerance``: IPOPT's tol.
+    ``starts``: number of starts in all. ``lattice_starts``: how many of them may be lattice points,
+    where the objective has a lattice. ``polish``: Newton on the residuals after each start, where
+    it has residuals; the remaining starts are skipped once one is exact (cost below 1e-9).
+    ``tolerance``: IPOPT's tol.
     """
 
-    name: ClassVar[str] = "ipopt"
-    needs: ClassVar[frozenset[Capability]] = frozenset({Capability.SYMBOLIC})
+    needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
 
     starts: int = 20  # chosen
-    lattice_starts: int = 8  # chosen
+    lattice_starts: int = 0
     max_iterations: int = 200
     tolerance: float = 1e-10
-    polish: bool = True
-    stop_when_exact: bool = True
+    polish: bool = False
 
-    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
-        program = _Program.of(self, run, cast(SymbolicObjective, run.objective))
-        run.constructed()
+    @property
+    def name(self) -> str:
+        parts = ("lattice", self.lattice_starts), ("ipopt", True), ("newton", self.polish)
+        return "+".join(name for name, on in parts if on)
+
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        """Search from each start in turn."""
         residual = Capability.RESIDUALS in run.objective.provides
-        successes, starts = 0, Starts(run)
+        starts, exact, program = Starts(run), 0, None
         for start in self._starts(run, x0, rng):
-            x = program.solve(start)
-            if self.polish and residual:
-                with_residuals = cast(ResidualObjective, run.objective)
-                turns = with_residuals.nearest_turns(x[None])[0]
-                x = solve_residuals(run, with_residuals, x, turns, iterations=12).x
-            run.propose(x)
-            stats = program.solver.stats()
-            starts.ended(bool(stats["success"]), str(stats["return_status"]))
+            try:
+                program = program or _Program(self, run, start)
+                x, stats = program.solve(start)
+            except NoGradient as error:
+                starts.ended(False, str(error))
+                continue
+            run.nit += int(stats["iter_count"])
+            if residual and self.polish:
+                objective = cast(ResidualObjective, run.objective)
+                turns = objective.nearest_turns(x[None])[0]
+                x = solve_residuals(run, objective, x, turns, iterations=12).x
             if residual:
-                scored = run.objective.score(x)
-                exact = bool(scored.cost[0] <= EXACT and scored.violation[0] <= FEASIBLE)
-                successes += exact
-                if exact and self.stop_when_exact:
+                run.propose(x)
+            starts.ended(bool(stats["success"]), str(stats["return_status"]))
+            if residual and float(run.objective.score(x).cost[0]) <= EXACT:
+                exact += 1
+                if self.polish:
                     break
         if not residual:
             return starts.verdict()
-        status = Status.CONVERGED if successes else Status.NO_EXACT
-        return status, f"{successes} of {starts.tried} starts exact"
+        status = Status.CONVERGED if exact else Status.NO_EXACT
+        return status, f"{exact} of {starts.tried} starts exact"
 
-    def _starts(self, run: Run, x0: Array | None, rng: Generator) -> list[Array]:
-        """Lattice points by peak wheel rate, then x0 or the middle of the bounds, then random
-        points."""
-        found: list[Array] = []
+    def _starts(self, run: Run, x0: Array | None, rng: Generator) -> Iterator[Array]:
+        """x0; lattice points by peak wheel rate; then as other local methods."""
+        given = 0
         if self.lattice_starts and hasattr(run.objective, "affine_part"):
             objective = cast(LatticeObjective, run.objective)
             part = objective.affine_part()
@@ -98,254 +100,128 @@ class Ipopt(Method):
                 points, _ = lattice_points(part, run.bounds[part.variables])
             candidates = np.tile(part.base, (len(points), 1))
             candidates[:, part.variables] = points
+            if x0 is not None:
+                yield x0
+                given, x0 = 1, None
             if len(points):
                 order = np.argsort(objective.effort(candidates), kind="stable")
-                found = list(candidates[order][: self.lattice_starts])
-        found.insert(
-            0 if x0 is not None else len(found), run.bounds.mean(axis=1) if x0 is None else x0
-        )
-        while len(found) < self.starts:
-            found.append(rng.uniform(run.bounds[:, 0], run.bounds[:, 1]))
-        return found[: self.starts]
+                for start in candidates[order][: self.lattice_starts]:
+                    yield start
+                    given += 1
+        yield from starting_points(run, x0, rng, self.starts - given)
 
 
-@dataclass
 class _Program:
-    """One compiled NLP, solved from many starts."""
+    """One NLP, built once and solved from many starts."""
 
-    run: Run
-    objective: SymbolicObjective
-    solver: Any
-    slacks: int
-    lower: Array
-    upper: Array
-    watch: Any
-
-    @classmethod
-    def of(cls, options: Ipopt, run: Run, objective: SymbolicObjective) -> _Program:
-        """Write the objective in symbols and hand it to IPOPT."""
-        import casadi as ca
-
-        middle = run.bounds.mean(axis=1)
-        parameters, slacks = objective.parameters_at(middle), objective.slacks_at(middle)
-        z = ca.MX.sym("z", run.objective.dimension + len(slacks))
-        p = ca.MX.sym("p", len(parameters))
-        problem = _in_symbols(objective, z, p)
-        constraints = ca.MX(0, 1) if problem.constraints is None else ca.MX(problem.constraints)
-        watch = _watcher(ca, run, z.numel(), constraints.numel(), p.numel())
-        settings: dict[str, Any] = {
-            "print_time": False,
-            "ipopt.print_level": 0,
-            "ipopt.sb": "yes",
-            "ipopt.tol": options.tolerance,
-            "ipopt.max_iter": options.max_iterations,
-            "iteration_callback": watch,
-            "ipopt.bound_relax_factor": 0.0,
-            "error_on_fail": False,
-        }
-        if run.budget.seconds is not None:
-            clock = "ipopt.max_wall_time" if run.budget.clock == "wall" else "ipopt.max_cpu_time"
-            settings[clock] = run.budget.seconds
-        nlp = {"x": z, "f": ca.MX(problem.cost), "g": constraints, "p": p}
-        return cls(
-            run,
-            objective,
-            ca.nlpsol("trajopt", "ipopt", nlp, settings),
-            len(slacks),
-            problem.lower,
-            problem.upper,
-            watch,
+    def __init__(self, options: Ipopt, run: Run, start: Array) -> None:
+        self.run, self.slacks = run, 0
+        written: Expressions | None = None
+        if Capability.SYMBOLIC in run.objective.provides:
+            written = self._of_objective(cast(SymbolicObjective, run.objective), start)
+            run.constructed()
+        else:
+            run.constructed()
+            here = run.at(start)  # tells how many constraints there are
+            self.limits = np.zeros((2, 0)) if run.limits is None else run.limits
+            self.values: Callable[[Array, Array], tuple[float, Array]] = self._by_run
+            if isinstance(run.objective, FunctionObjective):
+                written = _of_function(run, run.objective, start, float(here.cost[0]))
+        tolerance = options.tolerance if written else max(options.tolerance, _BY_DIFFERENCES)
+        ones = np.ones(self.slacks)
+        self.nlp = Nlp(
+            self.values,
+            self._watch,
+            np.concatenate([run.bounds[:, 0], 0.0 * ones]),
+            np.concatenate([run.width, ones]),
+            self.limits.shape[1],
+            written,
+            None if written else run.derivatives,
+            tolerance,
+            options.max_iterations,
         )
 
-    def solve(self, start: Array) -> Array:
-        """The decision variables (d,) where IPOPT ended from ``start`` (d,)."""
-        slacks = self.objective.slacks_at(start)
-        d = len(start)
-        self.watch.seen = 0
-        solution = self.solver(
-            x0=np.concatenate([start, slacks]),
-            p=self.objective.parameters_at(start),
-            lbx=np.concatenate([self.run.bounds[:, 0], np.zeros(self.slacks)]),
-            ubx=np.concatenate([self.run.bounds[:, 1], np.full(self.slacks, np.inf)]),
-            lbg=self.lower,
-            ubg=self.upper,
-        )
-        stats = self.solver.stats()
-        self.run.nit += int(stats["iter_count"])
-        # IPOPT's own calls beyond the one an iterate that the watch has counted: line searches.
-        self.run.nfev += max(0, int(stats.get("n_call_nlp_f", 0)) - self.watch.seen)
-        self.run.ngev += int(stats.get("n_call_nlp_grad_f", 0))
-        self.run.nhev += int(stats.get("n_call_nlp_hess_l", 0))
-        if self.watch.stopped is not None:
-            self.run.stop(self.watch.stopped)
-        x = np.clip(
-            np.asarray(solution["x"]).ravel()[:d], self.run.bounds[:, 0], self.run.bounds[:, 1]
-        )
-        if not np.all(np.isfinite(x)):
-            return start
-        self.run.evaluate(x[None])
-        return np.asarray(x)
+    def solve(self, start: Array) -> tuple[Array, dict[str, Any]]:
+        """The decision variables (d,) where IPOPT ended from ``start`` (d,), and its account."""
+        run, objective, d = self.run, self.run.objective, len(start)
+        first, parameters = start, np.zeros(0)
+        if Capability.SYMBOLIC in objective.provides:
+            symbolic = cast(SymbolicObjective, objective)
+            parameters = symbolic.parameters_at(start)
+            first = np.concatenate([start, symbolic.slacks_at(start)])
+        lower = np.concatenate([run.bounds[:, 0], np.zeros(self.slacks)])
+        upper = np.concatenate([run.bounds[:, 1], np.full(self.slacks, np.inf)])
+        try:
+            x, stats = self.nlp.solve(first, parameters, lower, upper, self.limits)
+        finally:
+            if self.nlp.written is not None:
+                run.ngev += int(self.nlp.account.get("n_call_nlp_grad_f", 0))
+                run.nhev += int(self.nlp.account.get("n_call_nlp_hess_l", 0))
+        x = np.clip(x[:d], run.bounds[:, 0], run.bounds[:, 1])
+        run.at(x)
+        return x if self.slacks else onto_constraints(run, x), stats
+
+    def _of_objective(self, objective: SymbolicObjective, start: Array) -> Expressions:
+        parameters, slacks = objective.parameters_at(start), objective.slacks_at(start)
+        d, self.slacks = len(start), len(slacks)
+        problems = []
+
+        def write(z: object, p: object) -> tuple[object, object]:
+            problems.append(objective.symbolic(z, p))
+            return problems[0].cost, problems[0].constraints
+
+        written = expressions(write, d + self.slacks, len(parameters))
+        self.limits = np.stack([problems[0].lower, problems[0].upper])
+        self._in_symbols = values_of(written)
+        self.values = self._by_symbols
+        return written
+
+    def _by_symbols(self, z: Array, p: Array) -> tuple[float, Array]:
+        self.run.spend(1)
+        return self._in_symbols(z, p)
+
+    def _by_run(self, x: Array, _: Array) -> tuple[float, Array]:
+        found = self.run.at(x)
+        rows = np.zeros(0) if found.constraints is None else found.constraints[0]
+        return float(found.cost[0]), rows
+
+    def _watch(self, z: Array) -> None:
+        """Each iterate is evaluated as the objective sees it, for the history."""
+        d = len(self.run.bounds)
+        if not np.isfinite(z).all():
+            return
+        self.run.at(z[:d])
 
 
-def _in_symbols(objective: SymbolicObjective, z: Any, p: Any) -> SymbolicProblem:
+def _of_function(
+    run: Run, function: FunctionObjective, start: Array, cost: float
+) -> Expressions | None:
+    """A plain function in symbols, where it runs on them and gives there what it gives for numbers.
+    Calls with symbols count as evaluations."""
+    if run.remaining() < 3 or function.gradient_of is True:
+        return None
+    functions = [lambda x: function.function(x, *function.arguments)]
     try:
-        with numpy_on_symbols(True):
-            return objective.symbolic(z, p)
-    except Exception as error:  # whatever a user's function raises on symbols
-        raise ArgumentError(
-            "objective",
-            f"{type(error).__name__}: {error}",
-            "a function written with NumPy "
-            "functions and arithmetic on its components, so that it runs on CasADi symbols; "
-            "take slsqp or pso otherwise",
-        ) from error
+        written = function_in_symbols(
+            [*functions, *(c.function for c in function.constraints)],
+            len(start),
+            lambda: run.spend(1),
+        )
+        told, rows = values_of(written)(start, np.zeros(0))
+    except Stop:
+        raise
+    except Exception:  # a function may fail in any way on symbols
+        return None
+    m = 0 if run.limits is None else run.limits.shape[1]
+    same = bool(np.isclose(told, cost, rtol=1e-9, atol=1e-12)) and len(rows) == m
+    return written if same else None
 
 
-@contextmanager
-def numpy_on_symbols(on: bool) -> Iterator[None]:
-    """Whether NumPy's functions and shapes hold for symbols inside the block (or the function, as a
-    decorator).
-
-    On: ``np.sin(x)`` runs on symbols, and vectors have NumPy's one dimension. Off: vectors are
-    columns, and a NumPy vector times a column of symbols goes element by element, as the programs
-    of this package are written. CasADi's switch is global, so each block sets what it needs and
-    gives back what it found.
-    """
-    import casadi as ca
-
-    before = ca.GlobalOptions.getNumpyMode()
-    ca.GlobalOptions.setNumpyMode(1 if on else 0)
-    try:
-        yield
-    finally:
-        ca.GlobalOptions.setNumpyMode(before)
+def polished() -> Ipopt:
+    """IPOPT, and Newton on the residuals after each start."""
+    return Ipopt(polish=True)
 
 
-def _watcher(ca: Any, run: Run, nx: int, ng: int, np_: int) -> Any:
-    """A CasADi callback that records each iterate in the run and stops IPOPT when the budget is
-    used up."""
-    d = run.objective.dimension
-
-    class Watch(ca.Callback):  # type: ignore[misc]
-        def __init__(self) -> None:
-            ca.Callback.__init__(self)
-            self.stopped: Status | None = None
-            self.seen = 0  # iterates of this start
-            self.construct("watch", {})
-
-        def get_n_in(self) -> int:
-            return int(ca.nlpsol_n_out())
-
-        def get_n_out(self) -> int:
-            return 1
-
-        def get_sparsity_in(self, i: int) -> Any:
-            sizes = {"f": 1, "x": nx, "lam_x": nx, "g": ng, "lam_g": ng, "p": np_, "lam_p": np_}
-            return ca.Sparsity.dense(sizes.get(ca.nlpsol_out(i), 0), 1)
-
-        def eval(self, arguments: Any) -> list[int]:
-            x = np.asarray(arguments[0]).ravel()[:d]
-            try:
-                run.spend(1)  # IPOPT's own call
-                self.seen += 1
-                run.evaluate(np.clip(x, run.bounds[:, 0], run.bounds[:, 1])[None])
-            except (
-                Exception
-            ) as stop:  # exceptions cannot cross CasADi: remember, and ask IPOPT to end
-                self.stopped = getattr(stop, "status", Status.FAILED)
-                return [1]
-            return [0]
-
-    return Watch()
-
-
-@dataclass(frozen=True, eq=False)
-class ProgramResult:
-    """What IPOPT found: ``x`` (n,), ``cost``, ``solved`` (to its tolerance), its own ``status`` and
-    iterations."""
-
-    x: Array
-    cost: float
-    solved: bool
-    status: str
-    iterations: int
-
-
-def variables(count: int) -> Any:
-    """A column of ``count`` symbols; slices and arithmetic give expressions."""
-    import casadi as ca
-
-    return ca.MX.sym("x", count)
-
-
-def stacked(parts: Sequence[Any]) -> Any:
-    """One column of expressions."""
-    import casadi as ca
-
-    return ca.vertcat(*parts)
-
-
-def matrix(values: Array) -> Any:
-    """A matrix of numbers that multiplies expressions; zeros are left out."""
-    import casadi as ca
-
-    return ca.sparsify(ca.DM(values))
-
-
-def total(column: Any) -> Any:
-    """Sum of a column of expressions."""
-    import casadi as ca
-
-    return ca.sum1(column)
-
-
-def smooth_table(grid: Array, values: Array) -> Callable[[Any], Any]:
-    """Cubic B-spline through ``values`` (N, K) on ``grid`` (N,): expressions (1, M) -> (K, M)."""
-    import casadi as ca
-
-    table = ca.interpolant(
-        "table", "bspline", [grid.tolist()], np.ascontiguousarray(values).ravel().tolist()
-    )
-    return lambda at: table.map(at.shape[1])(at)
-
-
-def solve_program(
-    x: Any,
-    cost: Any,
-    constraints: Any,
-    *,
-    start: Array,
-    lower: Array,
-    upper: Array,
-    constraint_lower: Array,
-    constraint_upper: Array,
-    tolerance: float = 1e-8,
-    max_iterations: int = 300,
-) -> ProgramResult:
-    """Minimise ``cost`` over the symbols ``x`` (n,) between bounds, with constraints between
-    theirs, by IPOPT.
-
-    Expressions come from ``variables``, ``stacked`` and ``smooth_table``. Warm start: ``start``
-    (n,).
-    """
-    import casadi as ca
-
-    settings: dict[str, Any] = {
-        "print_time": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",
-        "ipopt.tol": tolerance,
-        "ipopt.max_iter": max_iterations,
-        "ipopt.mu_strategy": "adaptive",
-        "error_on_fail": False,
-    }
-    solver = ca.nlpsol("program", "ipopt", {"x": x, "f": cost, "g": constraints}, settings)
-    found = solver(x0=start, lbx=lower, ubx=upper, lbg=constraint_lower, ubg=constraint_upper)
-    stats = solver.stats()
-    return ProgramResult(
-        np.asarray(found["x"], dtype=np.float64).ravel(),
-        float(found["f"]),
-        bool(stats["success"]),
-        str(stats["return_status"]),
-        int(stats["iter_count"]),
-    )
+def from_lattice() -> Ipopt:
+    """IPOPT from up to eight lattice points first, and Newton on the residuals after each start."""
+    return Ipopt(polish=True, lattice_starts=8)

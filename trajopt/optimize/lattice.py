@@ -17,15 +17,10 @@ from numpy.random import Generator
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import AffinePart, Capability, LatticeObjective, Objective
-from trajopt.optimize.base import (
-    FEASIBLE,
-    Run,
-    Status,
-    best_index,
-)
-from trajopt.optimize.method import Method
+from trajopt.objectives.base import AffinePart, Capability, LatticeObjective
+from trajopt.optimize.base import FEASIBLE, Status, best_index
 from trajopt.optimize.newton import solve_residuals
+from trajopt.optimize.run import Run
 
 EXACT = 1e-9  # cost, or wheel error in rad, up to which a solution counts as exact
 _NO_INFLUENCE = (
@@ -36,13 +31,12 @@ _BATCH = 100  # candidates evaluated at once, chosen
 
 
 @dataclass(frozen=True)
-class Lattice(Method):
+class Lattice:
     """Closed form over whole turns, then damped minimum-norm Newton where actuators limit the
     wheels.
 
     ``rounds``: how often Newton may go through all lattice points; from the second time on they are
-    those nearest to a random base point. Refuses an objective without an affine part, or one whose
-    wheel angles no free variable changes (ArgumentError).
+    those nearest to a random base point.
     """
 
     name: ClassVar[str] = "lattice"
@@ -51,22 +45,24 @@ class Lattice(Method):
 
     rounds: int = 5  # chosen
 
-    def _require(self, objective: Objective) -> None:
-        if not hasattr(objective, "affine_part"):
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:  # noqa: ARG002
+        """Solve. ``x0`` is not used: the method needs no start. ``rng`` draws base points for later
+        rounds.
+
+        Raises ArgumentError for an objective without an affine part, or one whose wheel angles no
+        free variable changes.
+        """
+        if not hasattr(run.objective, "affine_part"):
             raise ArgumentError(
                 "optimizer",
                 self.name,
                 "an objective with affine wheel angles (the terminal "
                 "objective); take pso or differential-evolution here",
             )
+        run.constructed()
+        return self._search(run, cast(LatticeObjective, run.objective), rng)
 
-    def _search(
-        self,
-        run: Run,
-        x0: Array | None,  # noqa: ARG002 - needs no start
-        rng: Generator,
-    ) -> tuple[Status, str]:
-        objective = cast(LatticeObjective, run.objective)
+    def _search(self, run: Run, objective: LatticeObjective, rng: Generator) -> tuple[Status, str]:
         part = objective.affine_part()
         if Capability.AFFINE not in objective.provides and not has_influence(part):
             return self._through_actuators(run, objective, part, part.base[None], rng)

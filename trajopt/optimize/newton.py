@@ -9,16 +9,52 @@ Gauss-Newton.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar, cast
 
 import numpy as np
+from numpy.random import Generator
 
 from trajopt.arrays import Array
-from trajopt.objectives.base import ResidualObjective
-from trajopt.optimize.base import Run
+from trajopt.objectives.base import Capability, ResidualObjective
+from trajopt.optimize.base import Status
+from trajopt.optimize.run import Run
 
 DIFFERENCE = 1e-6  # of the box width: step of the central differences for the Jacobian
 SOLVED = 1e-11  # largest weighted residual that counts as solved
 MAX_STEP = 0.25  # of the box width, largest component of one step
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Newton on the residuals, whole turns fixed at each start to the nearest ones, from x0 (or the
+    middle) and then from random points, until one is exact or the budget ends.
+
+    ``starts``: number of starts at most. Where no start is exact, the best is what all came to.
+    """
+
+    name: ClassVar[str] = "newton"
+    needs: ClassVar[frozenset[Capability]] = frozenset({Capability.RESIDUALS})
+    stochastic: ClassVar[bool] = True
+
+    starts: int = 100  # chosen
+
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        """Solve from each start in turn."""
+        run.constructed()
+        objective = cast(ResidualObjective, run.objective)
+        for index in range(self.starts):
+            start = run.bounds.mean(axis=1) if x0 is None else x0
+            if index:
+                start = rng.uniform(run.bounds[:, 0], run.bounds[:, 1])
+            run.evaluate(start[None])
+            turns = objective.nearest_turns(start[None])[0]
+            outcome = solve_residuals(run, objective, start, turns)
+            run.nit += 1
+            run.propose(outcome.x)
+            run.evaluate(outcome.x[None])
+            if outcome.solved:
+                return Status.CONVERGED, f"exact after {run.nit} Newton solves"
+        return Status.NO_EXACT, f"Newton solved none of {run.nit} starts"
 
 
 @dataclass(frozen=True)

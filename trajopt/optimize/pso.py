@@ -28,17 +28,16 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
-from trajopt.optimize.base import (
-    Run,
-    Status,
-    checked_bounds,
-    checked_x0,
-)
-from trajopt.optimize.method import Method
-from trajopt.optimize.swarm import Swarm, SwarmRules
+from trajopt.optimize.base import Status, checked_bounds, checked_x0
+from trajopt.optimize.derivatives import onto_constraints
+from trajopt.optimize.run import Run
+from trajopt.optimize.swarm import Swarm, SwarmRules, warm
+from trajopt.optimize.violations import Levels
 
 Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
+_REPAIRED = 10  # iterations between repairs of the best where there are equalities, chosen
+_CLAN = 0.03  # of the width: spread of a clan, chosen
 _CHOICES = {
     "topology": ("gbest", "ring"),
     "boundary": ("reset", "reflect", "mirror", "absorb", "invisible", "none"),
@@ -47,9 +46,8 @@ _CHOICES = {
 
 
 @dataclass(frozen=True)
-class ParticleSwarm(Method):
-    """PSO; a start (d,) becomes the first particle's position. Defaults are the constriction PSO
-    with a global best; the functions below are presets.
+class ParticleSwarm:
+    """PSO. Defaults are the constriction PSO with a global best; the functions below are presets.
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position
     inside 0.9 of the space ([guzman2015], Table 5.4) and stops the particle; "reflect" mirrors it
@@ -68,6 +66,7 @@ class ParticleSwarm(Method):
     name: ClassVar[str] = "pso"
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
+    saves: ClassVar[bool] = True
 
     particles: int = 50  # [guzman2015], section 4.2.2
     inertia: float = 0.7298  # [clerc2002]: constriction factor for phi = 4.1
@@ -104,12 +103,22 @@ class ParticleSwarm(Method):
         if self.stagnation is not None and self.stagnation < 1:
             raise ArgumentError("stagnation", self.stagnation, "at least 1 iteration, or None")
 
-    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
-        box = run.bounds
-        ended = self._flight(run, self.swarm(box, rng, x0=x0))
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        """Search until the budget ends or, without ``restart``, the swarm stagnates or collapses to
+        one point.
+
+        ``x0`` (d,) becomes the first particle's position; the last of the others begin around the
+        objective's own starts, where it has some.
+        """
+        warm()
+        run.constructed()
+        swarm = self.swarm(run.bounds, rng, x0=x0)
+        if self.start != "grid":
+            _clans(run, swarm)
+        ended = self._search(run, swarm)
         while self.restart:
-            best = None if run.best_x is None else np.clip(run.best_x, box[:, 0], box[:, 1])
-            self._flight(run, self.swarm(box, rng, x0=best))
+            best = None if run.best_x is None else np.clip(run.best_x, *run.bounds.T)
+            self._search(run, self.swarm(run.bounds, rng, x0=best))
         return ended
 
     def swarm(self, bounds: ArrayLike, rng: Generator, *, x0: ArrayLike | None = None) -> Swarm:
@@ -135,16 +144,20 @@ class ParticleSwarm(Method):
             checked_x0(x0, box),
         )
 
-    def _flight(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
+    def _search(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
+        run.keep(swarm)
         unseen = 0  # iterations in a row without a particle inside
         inside = self.boundary != "none"
+        levels = Levels(run)
         while True:
             asked = swarm.ask()
             if self.boundary != "invisible":
                 result = run.evaluate(asked, inside=inside)
+                swarm.level = levels.at(result.violation)
                 swarm.learn(result.cost, result.violation)
             elif len(asked):
                 result, unseen = run.evaluate(asked), 0
+                swarm.level = levels.at(result.violation)
                 swarm.tell(result.cost, result.violation)
             else:
                 swarm.tell(np.zeros(0))
@@ -155,10 +168,25 @@ class ParticleSwarm(Method):
                         f"all particles stayed outside the bounds for {_LOST} iterations",
                     )
             run.nit += 1
+            if levels.first and run.nit % _REPAIRED == 0:
+                found = onto_constraints(run, swarm.best[0])
+                swarm.offer(found, run.at(found))
+            run.checkpoint()
             if swarm.collapsed:
                 return Status.CONVERGED, "the swarm has collapsed to one point"
             if self.stagnation is not None and swarm.idle >= self.stagnation:
                 return Status.CONVERGED, f"no improvement in {self.stagnation} iterations"
+
+
+def _clans(run: Run, swarm: Swarm) -> None:
+    """Where the objective has starts of its own (routes on either side of obstacles), the last
+    particles begin around them, neighbours around the same one."""
+    if not hasattr(run.objective, "starts"):
+        return
+    own = run.objective.starts()[: len(swarm.x) // 2]
+    clans = np.repeat(own, len(swarm.x) // len(own), axis=0)
+    clans += _CLAN * run.width * swarm.rng.standard_normal(clans.shape)
+    swarm.x[len(swarm.x) - len(clans) :] = np.clip(clans, *run.bounds.T)
 
 
 def constriction() -> ParticleSwarm:

@@ -1,64 +1,51 @@
-"""Methods of scipy.optimize behind the package's contract. The only module that imports
-scipy.optimize."""
+"""Local methods of scipy.optimize behind the package's contract.
+
+They see variables scaled to the bounds, each constraint with its own value and gradient,
+and derivatives by the run: the objective's own, or differences on the scale of the bounds.
+"""
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.random import Generator
 
-from trajopt.arrays import Array
-from trajopt.objectives.base import Capability, Evaluation, Objective, ResidualObjective
-from trajopt.optimize.base import (
-    Run,
-    Starts,
-    Status,
-)
-from trajopt.optimize.method import Method, require_unconstrained
+from trajopt.arrays import Array, BoolArray
+from trajopt.objectives.base import Capability, ResidualObjective
+from trajopt.optimize.base import FEASIBLE, Status
+from trajopt.optimize.derivatives import NoGradient, onto_constraints
+from trajopt.optimize.run import Run
+from trajopt.optimize.starts import Starts, starting_points
 
 _LARGE = 1e100  # stands for an infeasible evaluation, since line searches cannot work with inf
+_FAR = 1e10  # by which constraints count as broken where they could not be computed
+_FLAT = 1e-6  # slope, a width of the bounds and a unit of cost, that counts as none; chosen
+_NEAR = 1e-7  # by which a constraint may be missed and still holds a search back, chosen
+# Iterations from one of many starts, chosen.
+_OF_MANY = {"SLSQP": 100, "trust-constr": 300, "COBYQA": 300}
+_FIRST_STEP = 0.1  # of the width: first step of methods without derivatives, chosen
 
-
-@dataclass
-class _Point:
-    """Cost and violation of the last candidate, so that a method asking for both pays once."""
-
-    run: Run
-    x: Array = field(default_factory=lambda: np.zeros(0))
-    value: Evaluation | None = None
-
-    def at(self, x: Array) -> Evaluation:
-        inside = np.clip(
-            x, self.run.bounds[:, 0], self.run.bounds[:, 1]
-        )  # undo rounding beyond the bounds
-        if self.value is None or not np.array_equal(inside, self.x):
-            self.x, self.value = inside.copy(), self.run.evaluate(inside[None])
-        return self.value
-
-    def cost(self, x: Array) -> float:
-        return float(min(self.at(x).cost[0], _LARGE))
-
-    def violation(self, x: Array) -> float:
-        return float(min(self.at(x).violation[0], _LARGE))
+Method = Literal["SLSQP", "L-BFGS-B", "trust-constr", "COBYQA", "Nelder-Mead"]
+_OPTIONS: dict[str, dict[str, Any]] = {
+    "COBYQA": {"initial_tr_radius": _FIRST_STEP, "feasibility_tol": FEASIBLE / 10},
+}
 
 
 @dataclass(frozen=True)
-class ScipyLocal(Method):
+class ScipyLocal:
     """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from
     random points.
 
-    ``starts``: number of starts; later ones are drawn uniformly from the bounds. Derivatives are
-    the objective's own where it offers them, SciPy's finite differences (counted as evaluations)
-    otherwise.
+    ``starts``: number of starts; later ones are drawn uniformly from the bounds.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
 
-    method: Literal["SLSQP", "L-BFGS-B", "trust-constr", "Nelder-Mead"]
+    method: Method
     starts: int = 10  # chosen
     tolerance: float = 1e-12  # SciPy's tol; tight, because budgets end searches here
 
@@ -66,119 +53,122 @@ class ScipyLocal(Method):
     def name(self) -> str:
         return self.method.lower()
 
-    def _require(self, objective: Objective) -> None:
-        if self.method in ("L-BFGS-B", "Nelder-Mead"):  # which know only bounds
-            require_unconstrained(self.name, objective)
+    @property
+    def only_bounds(self) -> bool:
+        return self.method in ("L-BFGS-B", "Nelder-Mead")
 
-    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+    @property
+    def differentiates(self) -> bool:
+        """Whether the method asks for derivatives."""
+        return self.method not in ("COBYQA", "Nelder-Mead")
+
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        """Search from each start in turn."""
+        import scipy.linalg  # loaded before the clock and the threads are looked at
         from scipy import optimize
 
-        point = _Point(run)
-        offered = Capability.GRADIENT in run.objective.provides and self.method != "Nelder-Mead"
-        low, high = run.bounds.T
-        options: dict[str, Any] = {"maxiter": 10_000}
+        assert scipy.linalg
+        run.constructed()
         starts = Starts(run)
-
-        def gradient(x: Array) -> Array:
-            run.ngev += 1
-            return np.asarray(cast(Any, run.objective).gradient(x))
-
-        for index in range(self.starts):
-            start = (low + high) / 2 if x0 is None else x0
-            if index > 0:
-                start = rng.uniform(low, high)
-            constraints = optimize.NonlinearConstraint(point.violation, -np.inf, 0.0)
-            with (
-                warnings.catch_warnings()
-            ):  # trust-constr warns where a gradient stays, as on piecewise linear costs
-                warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
-                result = optimize.minimize(
-                    point.cost,
-                    start,
-                    method=self.method,
-                    bounds=optimize.Bounds(low, high),
-                    tol=self.tolerance,
-                    jac=gradient if offered else None,
-                    options=options,
-                    **({"constraints": [constraints]} if run.objective.constrained else {}),
-                )
-            run.nit += int(result.nit)
-            starts.ended(_flagged(result) is Status.CONVERGED, str(result.message))
+        for start in starting_points(run, x0, rng, self.starts):
+            unit = (start - run.bounds[:, 0]) / run.width
+            try:
+                result = self._from(optimize, run, unit)
+            except (NoGradient, ValueError, ArithmeticError) as error:  # SciPy's own, too
+                starts.ended(False, str(error))
+                continue
+            run.nit += int(getattr(result, "nit", 0))
+            if self.differentiates:
+                onto_constraints(run, run.bounds[:, 0] + run.width * result.x)
+            converged = bool(result.success) or self._settled(optimize, run, result.x)
+            starts.ended(converged, str(result.message))
         return starts.verdict()
 
+    def _from(self, optimize: Any, run: Run, unit: Array) -> Any:
+        low = run.bounds[:, 0]
+
+        def cost(u: Array) -> float:
+            return float(min(run.at(low + run.width * u).cost[0], _LARGE))
+
+        def gradient(u: Array) -> Array:
+            return np.asarray(run.derivatives(low + run.width * u)[0] * run.width)
+
+        # Where an objective offers many starts, none is to hold the others up.
+        most = _OF_MANY[self.method] if hasattr(run.objective, "starts") else 10_000
+        options: dict[str, Any] = {"maxiter": most, **_OPTIONS.get(self.method, {})}
+        if self.method == "COBYQA":
+            options["maxfev"] = min(run.remaining() + 1, 10_000_000)
+        if self.method == "Nelder-Mead":
+            steps = np.where(unit + _FIRST_STEP > 1.0, -_FIRST_STEP, _FIRST_STEP)
+            options["initial_simplex"] = np.vstack([unit, unit + np.diag(steps)])
+        cost(unit)  # tells how many constraints there are
+        with warnings.catch_warnings():
+            # trust-constr warns where a gradient stays, as on piecewise linear costs, and where
+            # gradients of constraints depend on each other.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            warnings.filterwarnings("ignore", "delta_grad == 0.0", UserWarning)
+            warnings.filterwarnings("ignore", "Singular Jacobian matrix", UserWarning)
+            return optimize.minimize(
+                cost,
+                unit,
+                method=self.method,
+                bounds=optimize.Bounds(np.zeros(len(unit)), np.ones(len(unit))),
+                tol=self.tolerance,
+                jac=gradient if self.differentiates else None,
+                options=options,
+                **self._constraints(optimize, run),
+            )
+
+    def _constraints(self, optimize: Any, run: Run) -> dict[str, Any]:
+        if not run.objective.constrained:
+            return {}
+        low, limits = run.bounds[:, 0], run.limits
+        if limits is None:  # an objective that only tells a violation in all
+            whole = optimize.NonlinearConstraint(
+                lambda u: float(min(run.at(low + run.width * u).violation[0], _LARGE)), -np.inf, 0.0
+            )
+            return {"constraints": [whole]}
+        broken = np.where(np.isfinite(limits[0]), limits[0] - _FAR, limits[1] + _FAR)
+
+        def constraint(kind: BoolArray) -> Any:  # equalities and others apart, as SciPy wants them
+            def values(u: Array) -> Array:
+                found = run.at(low + run.width * u).constraints
+                assert found is not None
+                return np.asarray(np.where(np.isfinite(found[0]), found[0], broken)[kind])
+
+            def jacobian(u: Array) -> Array:
+                return np.asarray((run.derivatives(low + run.width * u)[1] * run.width)[kind])
+
+            extra = {"jac": jacobian} if self.differentiates else {}
+            return optimize.NonlinearConstraint(values, *limits[:, kind], **extra)
+
+        equal = limits[0] == limits[1]
+        return {"constraints": [constraint(kind) for kind in (equal, ~equal) if kind.any()]}
+
+    def _settled(self, optimize: Any, run: Run, unit: Array) -> bool:
+        """Whether a method that gave up had nothing left to gain: the cost's slope is one of what
+        keeps it in (Karush, Kuhn, Tucker), to rounding."""
+        if not self.differentiates or (run.objective.constrained and run.limits is None):
+            return False
+        x, d = run.bounds[:, 0] + run.width * unit, len(unit)
+        kept, limits = run.at(x).constraints, run.limits
+        gradient, jacobian = (slopes * run.width for slopes in run.derivatives(x))
+        values, slopes = unit, np.eye(d)
+        low, high = np.zeros(d), np.ones(d)
+        if kept is not None and limits is not None:
+            values, slopes = np.append(unit, kept[0]), np.concatenate([slopes, jacobian])
+            low, high = np.append(low, limits[0]), np.append(high, limits[1])
+        if max(np.max(low - values), np.max(values - high)) > _NEAR:
+            return False
+        walls = np.concatenate([slopes[values <= low + _NEAR], -slopes[values >= high - _NEAR]])
+        pull = optimize.nnls(walls.T, gradient)[0] @ walls if len(walls) else 0.0
+        costs = [row[2] for row in run.improvements if np.isfinite(row[2])]
+        scale = max(abs(run.best_cost), costs[0] - run.best_cost if costs else 0.0)
+        return bool(np.max(np.abs(gradient - pull)) <= _FLAT * scale)
+
 
 @dataclass(frozen=True)
-class DifferentialEvolution(Method):
-    """scipy.optimize.differential_evolution with its own defaults, ``population`` as popsize."""
-
-    name: ClassVar[str] = "differential-evolution"
-    needs: ClassVar[frozenset[Capability]] = frozenset()
-    stochastic: ClassVar[bool] = True
-
-    population: int = 15  # SciPy's default
-    tolerance: float = (
-        1e-12  # SciPy's tol on the population's spread; tight, because budgets end searches
-    )
-
-    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
-        from scipy import optimize
-
-        constrained = run.objective.constrained
-        point = _Point(run)
-
-        def costs(x: Array) -> Any:
-            """SciPy hands one candidate (d,) when polishing and candidates in columns (d, n)
-            otherwise."""
-            if x.ndim == 1:
-                return point.cost(x)
-            return np.minimum(run.evaluate(x.T).cost, _LARGE)
-
-        extra: dict[str, Any] = {"vectorized": True, "updating": "deferred"}
-        if constrained:  # SciPy evaluates constraints one by one unless both are vectorised
-            extra = {"constraints": (optimize.NonlinearConstraint(point.violation, -np.inf, 0.0),)}
-        result = optimize.differential_evolution(
-            point.cost if constrained else costs,
-            optimize.Bounds(*run.bounds.T),
-            x0=x0,
-            rng=rng,
-            popsize=self.population,
-            tol=self.tolerance,
-            maxiter=1_000_000,
-            polish=not constrained,
-            **extra,
-        )
-        run.nit = int(result.nit)
-        return _flagged(result), str(result.message)
-
-
-@dataclass(frozen=True)
-class DualAnnealing(Method):
-    """scipy.optimize.dual_annealing with its own defaults (generalised annealing and L-BFGS-B)."""
-
-    name: ClassVar[str] = "dual-annealing"
-    needs: ClassVar[frozenset[Capability]] = frozenset()
-    stochastic: ClassVar[bool] = True
-
-    def _require(self, objective: Objective) -> None:
-        require_unconstrained(self.name, objective)
-
-    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
-        from scipy import optimize
-
-        result = optimize.dual_annealing(
-            _Point(run).cost,
-            optimize.Bounds(*run.bounds.T),
-            x0=x0,
-            rng=rng,
-            maxiter=1_000_000,
-            maxfun=1_000_000_000,
-        )
-        run.nit = int(result.nit)
-        return _flagged(result), str(result.message[0])
-
-
-@dataclass(frozen=True)
-class LeastSquares(Method):
+class LeastSquares:
     """scipy.optimize.least_squares (trust-region reflective) on the gain-weighted residuals, whole
     turns fixed.
 
@@ -193,9 +183,13 @@ class LeastSquares(Method):
     starts: int = 20  # chosen
     tolerance: float = 1e-15  # SciPy's xtol, ftol and gtol; tight, because budgets end searches
 
-    def _search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+    def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
+        """Search from each start in turn."""
+        import scipy.linalg
         from scipy import optimize
 
+        assert scipy.linalg
+        run.constructed()
         objective = cast(ResidualObjective, run.objective)
         gains, (low, high) = objective.residual_gains(), run.bounds.T
         starts = Starts(run)
@@ -210,26 +204,25 @@ class LeastSquares(Method):
                 return np.asarray(gains * np.array(values))
 
             # SciPy asks for a start strictly inside.
-            inside = np.clip(start, low + 1e-9 * (high - low), high - 1e-9 * (high - low))
-            result = optimize.least_squares(
-                weighted,
-                inside,
-                bounds=(low, high),
-                x_scale=high - low,
-                xtol=self.tolerance,
-                ftol=self.tolerance,
-                gtol=self.tolerance,
-            )
+            inside = np.clip(start, low + 1e-9 * run.width, high - 1e-9 * run.width)
+            try:
+                result = optimize.least_squares(
+                    weighted,
+                    inside,
+                    bounds=(low, high),
+                    x_scale=run.width,
+                    xtol=self.tolerance,
+                    ftol=self.tolerance,
+                    gtol=self.tolerance,
+                )
+            except ValueError as error:  # residuals that are not finite
+                starts.ended(False, str(error))
+                continue
             run.nit += int(result.njev)
             run.evaluate(np.clip(result.x, low, high)[None])
             run.propose(result.x)
             starts.ended(bool(result.success), str(result.message))
         return starts.verdict()
-
-
-def _flagged(result: Any) -> Status:
-    """SciPy's own flag as a status: its ``success`` says whether its stopping rule was met."""
-    return Status.CONVERGED if result.success else Status.STALLED
 
 
 def slsqp() -> ScipyLocal:
@@ -244,7 +237,12 @@ def l_bfgs_b() -> ScipyLocal:
 
 def trust_constr() -> ScipyLocal:
     """Trust-region method for constrained problems."""
-    return ScipyLocal("trust-constr", starts=3)
+    return ScipyLocal("trust-constr")
+
+
+def cobyqa() -> ScipyLocal:
+    """COBYQA [ragonneau2024]: quadratic models without derivatives, with constraints."""
+    return ScipyLocal("COBYQA")
 
 
 def nelder_mead() -> ScipyLocal:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -11,13 +12,17 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import require_whole
 from trajopt.errors import ArgumentError
-from trajopt.objectives.base import Capability, Objective
-from trajopt.optimize.base import Budget, Optimizer, OptimizeResult, checked_bounds
+from trajopt.objectives.base import Objective
+from trajopt.optimize.base import Budget, Optimizer, OptimizeResult, checked_bounds, checked_x0
 from trajopt.optimize.functions import as_objective
 from trajopt.optimize.plugins import installed_optimizers, optimizers_of_file
+from trajopt.optimize.run import Callback, Progress, Run
+from trajopt.optimize.state import StateFile
+from trajopt.optimize.workers import Pool
 
 # name -> module and the class or preset function that makes it with default options
 OPTIMIZERS: dict[str, tuple[str, str]] = {
+    "auto": ("trajopt.optimize.portfolio", "Auto"),
     "pso": ("trajopt.optimize.pso", "local_best"),
     "pso-gbest": ("trajopt.optimize.pso", "constriction"),
     "pso-thesis-first": ("trajopt.optimize.pso", "thesis_first"),
@@ -25,18 +30,20 @@ OPTIMIZERS: dict[str, tuple[str, str]] = {
     "pso-ring": ("trajopt.optimize.pso", "ring"),
     "pso-inertia": ("trajopt.optimize.pso", "falling_inertia"),
     "lattice": ("trajopt.optimize.lattice", "Lattice"),
+    "newton": ("trajopt.optimize.newton", "Newton"),
     "ipopt": ("trajopt.optimize.ipopt", "Ipopt"),
+    "ipopt+newton": ("trajopt.optimize.ipopt", "polished"),
+    "lattice+ipopt+newton": ("trajopt.optimize.ipopt", "from_lattice"),
     "slsqp": ("trajopt.optimize.scipy", "slsqp"),
     "l-bfgs-b": ("trajopt.optimize.scipy", "l_bfgs_b"),
     "trust-constr": ("trajopt.optimize.scipy", "trust_constr"),
+    "cobyqa": ("trajopt.optimize.scipy", "cobyqa"),
     "nelder-mead": ("trajopt.optimize.scipy", "nelder_mead"),
-    "differential-evolution": ("trajopt.optimize.scipy", "DifferentialEvolution"),
-    "dual-annealing": ("trajopt.optimize.scipy", "DualAnnealing"),
+    "differential-evolution": ("trajopt.optimize.scipy_global", "differential_evolution"),
+    "dual-annealing": ("trajopt.optimize.scipy_global", "dual_annealing"),
+    "direct": ("trajopt.optimize.scipy_global", "direct"),
     "least-squares": ("trajopt.optimize.scipy", "LeastSquares"),
     "cma-es": ("trajopt.optimize.cma_es", "CmaEs"),
-    "direct": ("trajopt.optimize.nlopt", "direct"),
-    "bobyqa": ("trajopt.optimize.nlopt", "bobyqa"),
-    "hybrid": ("trajopt.optimize.hybrid", "hybrid"),
 }
 
 
@@ -65,14 +72,14 @@ def optimizer_named(name: str) -> Optimizer:
         offered, wanted = installed_optimizers(), name
     if wanted not in offered:
         known = OPTIMIZERS if file == name else ()
-        raise ArgumentError("optimizer", name, "auto or one of " + ", ".join([*known, *offered]))
+        raise ArgumentError("optimizer", name, "one of " + ", ".join([*known, *offered]))
     return checked_optimizer(name, offered[wanted]())
 
 
 def checked_optimizer(name: str, made: Any) -> Optimizer:
     """``made``, if it keeps the contract of optimizers. Raises ArgumentError naming what is
     missing."""
-    for attribute in ("name", "needs", "stochastic", "minimize"):
+    for attribute in ("name", "needs", "stochastic", "search"):
         if not hasattr(made, attribute):
             raise ArgumentError(
                 "optimizer", name, f"an object with '{attribute}' (optimize.base.Optimizer)"
@@ -80,60 +87,88 @@ def checked_optimizer(name: str, made: Any) -> Optimizer:
     return cast(Optimizer, made)
 
 
-def automatic(objective: Objective) -> str:
-    """Name of the optimizer that suits an objective best.
-
-    The lattice where it is exact by construction; otherwise the swarm, which asks nothing of the
-    objective.
-    """
-    if hasattr(objective, "affine_part"):
-        return "lattice"
-    return "pso" if Capability.BATCH in objective.provides else "differential-evolution"
-
-
 def minimize(
-    objective: Objective | Callable[[Any], Any],
+    objective: Objective | Callable[..., Any],
     bounds: ArrayLike,
     *,
+    jac: Callable[..., Any] | bool | None = None,
+    constraints: Any = (),
+    args: tuple[Any, ...] = (),
+    callback: Callback | None = None,
+    workers: Any = None,
     optimizer: str | Optimizer = "auto",
     x0: ArrayLike | None = None,
     seed: int = 0,
     budget: Budget | None = None,
-    progress: Callable[[int, float], None] | None = None,
+    state: str | Path | None = None,
+    progress: Progress | None = None,
 ) -> OptimizeResult:
     """Minimise an objective, or a plain function, inside ``bounds`` (d, 2).
 
-    A function may map one candidate (d,) to a number, or a batch (n, d) to (n,). ``optimizer`` is a
-    name (see ``OPTIMIZERS``), an optimizer with options, or "auto", which says in the message what
-    it took. The same ``seed`` and a budget in evaluations give the same bits.
-    ``progress(evaluations, best_cost)`` is called after every batch. Raises ArgumentError for bad
-    input.
+    A function maps one candidate (d,) and ``args`` to a number, or a batch (n, d) to (n,); it may
+    be a function or an expression of CasADi. ``jac`` gives its gradient (d,); True: the function
+    returns (cost, gradient). ``constraints``: one or a list of SciPy's NonlinearConstraint,
+    LinearConstraint or dictionaries, pairs of functions (g, its Jacobian or None) for g(x) >= 0,
+    ("ineq", g) or ("eq", g).
+
+    ``callback(x, cost, violation)`` sees the best so far after each evaluation (of a batch) and
+    ends the search by returning True. ``workers`` (a number of processes, an executor, a Dask
+    client) evaluate slow objectives at the same time. ``optimizer`` is a name
+    (``optimizer_names``), an optimizer with options, or "auto", which says in the message what it
+    took. The same ``seed`` and a budget in evaluations give the same bits, whatever the number of
+    threads and workers. ``state`` names a file (*.npz) from which a population method goes on where
+    it exists, and to which it saves itself; the budget counts anew. ``progress(evaluations,
+    best_cost)`` is called where ``callback`` is.
+
+    Ctrl-C, SIGTERM, the callback and the budget end a search without loss: the best so far is
+    returned, with a status that says why. Raises ArgumentError for bad input.
+
+    >>> found = minimize(lambda x: (x[0] - 1) ** 2 + x[1] ** 2, [[-2, 2]] * 2,
+    ...                  constraints=[("ineq", lambda x: x[1] - x[0])], optimizer="slsqp")
+    >>> found.x.round(3).tolist(), round(found.fun, 4)
+    ([0.5, 0.5], 0.5)
     """
     box = checked_bounds(bounds)
-    problem = as_objective(objective, box)
+    asked = as_objective(objective, box, jac=jac, constraints=constraints, args=args)
+    box = checked_bounds(box, asked.dimension)
+    start = checked_x0(x0, box)
     require_whole("seed", seed, 0, "a whole number >= 0")
-    chosen = automatic(problem) if optimizer == "auto" else optimizer
-    method = (
-        optimizer_named(chosen)
-        if isinstance(chosen, str)
-        else checked_optimizer(repr(chosen), chosen)
-    )
     if not (budget is None or isinstance(budget, Budget)):
         raise ArgumentError("budget", budget, "a Budget, e.g. Budget(evaluations=1000)")
-    missing = method.needs - problem.provides
+    for name, function in (("callback", callback), ("progress", progress)):
+        if not (function is None or callable(function)):
+            raise ArgumentError(name, function, "a function, or None")
+    if isinstance(optimizer, str):
+        method = optimizer_named(optimizer)
+    else:
+        method = checked_optimizer(repr(optimizer), optimizer)
+    refuse_unfit(method, asked)
+    kept = None
+    if state is not None:
+        if not getattr(method, "saves", False):
+            able = ", ".join(n for n in OPTIMIZERS if getattr(optimizer_named(n), "saves", False))
+            raise ArgumentError("state", str(state), f"None for {method.name}: only {able} save")
+        kept = StateFile(state, method, box)
+    if hasattr(asked, "prepare"):
+        asked.prepare()  # compiles, say, before the clock runs
+    pool = Pool.of(workers, asked)
+    try:
+        run = Run(asked, box, budget or Budget(), progress, callback, pool, kept)
+        rng = np.random.default_rng(seed)
+        note = getattr(asked, "impossible", str)()
+        return run.finish(method.name, lambda: method.search(run, start, rng), note)
+    finally:
+        if pool is not None:
+            pool.close()
+
+
+def refuse_unfit(method: Optimizer, objective: Objective) -> None:
+    """Raises ArgumentError where an optimizer cannot work on an objective, saying why."""
+    missing = method.needs - objective.provides
     if missing:
-        raise ArgumentError(
-            "optimizer",
-            method.name,
-            "an optimizer that works without "
-            + ", ".join(sorted(c.name.lower() for c in missing))
-            + ", which this objective does not offer",
-        )
-    return method.minimize(
-        problem,
-        box,
-        x0=x0,
-        rng=np.random.default_rng(seed),
-        budget=budget or Budget(),
-        progress=progress,
-    )
+        lacks = ", ".join(sorted(c.name.lower() for c in missing))
+        expected = f"an optimizer that works without {lacks}, which this objective does not offer"
+        raise ArgumentError("optimizer", method.name, expected)
+    if objective.constrained and getattr(method, "only_bounds", False):
+        expected = "a method that handles constraints: pso, cma-es, slsqp, trust-constr or cobyqa"
+        raise ArgumentError("optimizer", method.name, expected)

@@ -6,13 +6,11 @@ bit by bit.
 
 from __future__ import annotations
 
-import json
 import sys
-import zlib
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.random import Generator
@@ -20,8 +18,9 @@ from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.errors import ArgumentError
-from trajopt.files import whole_file
+from trajopt.objectives.base import Evaluation
 from trajopt.optimize.base import FEASIBLE, best_index, better
+from trajopt.optimize.state import read_state, write_state
 
 _COLLAPSED = 1e-15  # of the width: spread and velocity at which a swarm has come to rest
 _ARRAYS = ("bounds", "x", "v", "own", "own_cost", "own_violation")
@@ -59,6 +58,7 @@ class Swarm:
     own_violation: Array
     iteration: int = 0
     idle: int = 0
+    level: float = FEASIBLE  # violation up to which candidates count as feasible
     _reached: tuple[float, float] = (np.inf, np.inf)
 
     def __post_init__(self) -> None:
@@ -75,6 +75,9 @@ class Swarm:
         self._pulls = np.empty((2, *self.x.shape))
         self._drawn = np.empty((2, *self.x.shape))
         self._leaders = np.zeros(len(self.x), dtype=np.intp)
+        self._places, reach = np.arange(len(self.x)), self.rules.neighbours
+        around = self._places[:, None] + np.arange(-reach, reach + 1)
+        self._ring = np.sort(around % len(self.x), axis=1)  # ties go to the lower index
 
     @classmethod
     def begin(
@@ -112,13 +115,13 @@ class Swarm:
         """``tell`` without its checks: costs and violations (n,) of all particles, none NaN."""
         if self._kernel is None:
             self._remember(cost, violation)
-            leader = best_index(self.own_cost, self.own_violation)
+            leader = best_index(self.own_cost, self.own_violation, self.level)
         else:
             leader = self._kernel.remember(
-                self.x, self.own, self.own_cost, self.own_violation, cost, violation
+                self.x, self.own, self.own_cost, self.own_violation, cost, violation, self.level
             )
         reached = self.own_cost[leader], self.own_violation[leader]
-        self.idle = 0 if better(*reached, *self._reached) else self.idle + 1
+        self.idle = 0 if better(*reached, *self._reached, self.level) else self.idle + 1
         self._reached = float(reached[0]), float(reached[1])
         if self.rules.topology == "gbest":
             self._leaders.fill(leader)
@@ -126,16 +129,28 @@ class Swarm:
             self._leaders[:] = self._ring_leaders()
         else:
             self._kernel.ring_leaders(
-                self.own_cost, self.own_violation, self.rules.neighbours, self._leaders
+                self.own_cost,
+                self.own_violation,
+                self.level,
+                self.rules.neighbours,
+                self._leaders,
             )
         self._move()
         self.iteration += 1
+
+    def offer(self, x: Array, found: Evaluation) -> None:
+        """A candidate (d,) found outside the swarm takes the place of the best, where it is
+        better."""
+        i = best_index(self.own_cost, self.own_violation, self.level)
+        cost, violation = float(found.cost[0]), float(found.violation[0])
+        if better(cost, violation, self.own_cost[i], self.own_violation[i], self.level):
+            self.own[i], self.own_cost[i], self.own_violation[i] = x, cost, violation
 
     @property
     def best(self) -> tuple[Array, float, float]:
         """Best candidate (d,) told so far, its cost and violation (both inf before the first
         ``tell``)."""
-        i = best_index(self.own_cost, self.own_violation)
+        i = best_index(self.own_cost, self.own_violation, self.level)
         return self.own[i].copy(), float(self.own_cost[i]), float(self.own_violation[i])
 
     @property
@@ -151,26 +166,32 @@ class Swarm:
     # -- saving
     # ---------------------------------------------------------------------------------------
 
+    def pack(self) -> dict[str, Any]:
+        """The whole state: arrays and plain values."""
+        return {
+            "rules": asdict(self.rules),
+            "iteration": self.iteration,
+            "idle": self.idle,
+            "level": self.level,
+            "rng": self.rng.bit_generator.state,
+            **{name: getattr(self, name) for name in _ARRAYS},
+        }
+
+    def unpack(self, kept: Mapping[str, Any]) -> None:
+        """Go on from what ``pack`` gave."""
+        if kept["rules"] != asdict(self.rules) or kept["x"].shape != self.x.shape:
+            raise ValueError(f"a swarm with the rules {kept['rules']}")
+        for name in _ARRAYS:
+            getattr(self, name)[:] = kept[name]
+        self.rng.bit_generator.state = kept["rng"]
+        self.iteration, self.idle = kept["iteration"], kept["idle"]
+        self.level = kept["level"]
+        self.__post_init__()
+
     def save(self, path: str | Path) -> None:
         """Write the whole state to ``path`` (*.npz), under a temporary name first; ``load`` goes on
         from it."""
-        target = Path(path)
-        state = json.dumps(
-            {
-                "rules": asdict(self.rules),
-                "iteration": self.iteration,
-                "idle": self.idle,
-                "rng": self.rng.bit_generator.state,
-            },
-            default=_plain,
-        )
-        with whole_file(target) as part, part.open("wb") as file:
-            np.savez(
-                file,
-                allow_pickle=False,
-                state=np.array(state),
-                **{name: getattr(self, name) for name in _ARRAYS},
-            )
+        write_state(path, self.pack())
 
     @classmethod
     def load(cls, path: str | Path) -> Swarm:
@@ -178,39 +199,17 @@ class Swarm:
 
         Raises ArgumentError for a file that is missing or no saved swarm.
         """
+        kept = read_state(path, "Swarm.save")
         try:
-            with np.load(path, allow_pickle=False) as data:
-                state = json.loads(str(data["state"]))
-                arrays = [data[name] for name in _ARRAYS]
-            kind = getattr(np.random, state["rng"]["bit_generator"])()
-            kind.state = _restored(state["rng"])
-            rules = SwarmRules(**state["rules"])
-        except (
-            OSError,
-            ValueError,
-            KeyError,
-            TypeError,
-            AttributeError,
-            EOFError,
-            BadZipFile,
-            zlib.error,
-        ) as error:
+            rng = Generator(getattr(np.random, kept["rng"]["bit_generator"])())
+            arrays = [kept[name] for name in _ARRAYS]
+            found = cls(SwarmRules(**kept["rules"]), arrays[0], rng, *arrays[1:])
+            found.unpack(kept)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise ArgumentError(
                 "path", str(path), f"a file written by Swarm.save ({error})"
             ) from None
-        bounds, x, v, own, cost, violation = arrays
-        return cls(
-            rules,
-            bounds,
-            Generator(kind),
-            x,
-            v,
-            own,
-            cost,
-            violation,
-            state["iteration"],
-            state["idle"],
-        )
+        return found
 
     # -- one iteration
     # --------------------------------------------------------------------------------
@@ -244,7 +243,7 @@ class Swarm:
         """Update own bests by Deb's rule."""
         improved = cost < self.own_cost
         if np.count_nonzero(violation) or np.count_nonzero(self.own_violation):
-            new, old = violation <= FEASIBLE, self.own_violation <= FEASIBLE
+            new, old = violation <= self.level, self.own_violation <= self.level
             less = (violation < self.own_violation) | ((violation == self.own_violation) & improved)
             improved = np.where(new & old, improved, np.where(new | old, new, less))
             self.own_violation[improved] = violation[improved]
@@ -255,13 +254,13 @@ class Swarm:
 
     def _ring_leaders(self) -> IndexArray:
         """(n,): the best own position among each particle's neighbours and itself."""
-        feasible = self.own_violation <= FEASIBLE
-        order = np.lexsort((self.own_cost, np.where(feasible, 0.0, self.own_violation)))
-        rank = np.empty(len(order), dtype=np.intp)
-        rank[order] = np.arange(len(order))
-        reach = self.rules.neighbours
-        best = np.min([np.roll(rank, k) for k in range(-reach, reach + 1)], axis=0)
-        return np.asarray(order[best])
+        rank = self.own_cost
+        if np.count_nonzero(self.own_violation > self.level):
+            broken = np.where(self.own_violation <= self.level, 0.0, self.own_violation)
+            rank = np.empty(len(broken))
+            rank[np.lexsort((self.own_cost, broken))] = np.arange(len(broken))
+        best = rank[self._ring].argmin(axis=1)
+        return np.asarray(self._ring[self._places, best])
 
     def _move(self) -> None:
         rules, x, v = self.rules, self.x, self.v
@@ -339,6 +338,12 @@ def _bring_back(
     x[rows, columns] = np.minimum(np.maximum(at, least), most)
 
 
+def warm() -> None:
+    """Load or compile what ``Swarm`` will use."""
+    if (kernel := _kernel()) is not None:
+        kernel.warm()
+
+
 def _kernel() -> Any:
     """The compiled iteration where numba has been loaded already (by a compiled objective, say);
     else None.
@@ -371,20 +376,3 @@ def _positions(rules: SwarmRules, bounds: Array, rng: Generator) -> Array:
         x[:, 0] = low[0] + width[0] * (i // 10 % columns + 1) / (columns + 1)
         x[:, 1] = low[1] + width[1] * (i % 10 + 1) / 11
     return np.asarray(x)
-
-
-def _plain(value: object) -> object:
-    """NumPy values of a random generator's state as JSON."""
-    if isinstance(value, np.ndarray):
-        return {"dtype": str(value.dtype), "values": value.tolist()}
-    if isinstance(value, np.integer):
-        return int(value)
-    raise TypeError(f"{type(value).__name__} in the state of a random generator")
-
-
-def _restored(value: object) -> object:
-    if isinstance(value, dict):
-        if set(value) == {"dtype", "values"}:
-            return np.array(value["values"], dtype=value["dtype"])
-        return {key: _restored(entry) for key, entry in value.items()}
-    return value

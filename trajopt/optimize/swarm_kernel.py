@@ -9,15 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from trajopt.kernels import kernel
-from trajopt.optimize.base import FEASIBLE
 
 
 @kernel()
-def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[no-untyped-def]
+def remember(x, own, own_cost, own_violation, cost, violation, level):  # type: ignore[no-untyped-def]
     """Update own bests in place by Deb's rule; the index of the swarm's best."""
     n, d = x.shape
     for i in range(n):
-        new, old = violation[i] <= FEASIBLE, own_violation[i] <= FEASIBLE
+        new, old = violation[i] <= level, own_violation[i] <= level
         if new and old:
             improved = cost[i] < own_cost[i]
         elif new or old:
@@ -30,9 +29,9 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
             own_cost[i], own_violation[i] = cost[i], violation[i]
             for j in range(d):
                 own[i, j] = x[i, j]
-    best, feasible = 0, own_violation[0] <= FEASIBLE
+    best, feasible = 0, own_violation[0] <= level
     for i in range(1, n):
-        inside = own_violation[i] <= FEASIBLE
+        inside = own_violation[i] <= level
         if (
             (inside and not feasible)
             or (inside and own_cost[i] < own_cost[best])
@@ -43,7 +42,7 @@ def remember(x, own, own_cost, own_violation, cost, violation):  # type: ignore[
 
 
 @kernel()
-def ring_leaders(own_cost, own_violation, reach, leaders):  # type: ignore[no-untyped-def]
+def ring_leaders(own_cost, own_violation, level, reach, leaders):  # type: ignore[no-untyped-def]
     """Fill ``leaders`` (n,): the index of the best own position within ``reach`` places on the
     ring."""
     n = len(own_cost)
@@ -51,8 +50,8 @@ def ring_leaders(own_cost, own_violation, reach, leaders):  # type: ignore[no-un
         best = i
         for k in range(-reach, reach + 1):
             j = (i + k) % n
-            new = 0.0 if own_violation[j] <= FEASIBLE else own_violation[j]
-            old = 0.0 if own_violation[best] <= FEASIBLE else own_violation[best]
+            new = 0.0 if own_violation[j] <= level else own_violation[j]
+            old = 0.0 if own_violation[best] <= level else own_violation[best]
             if new < old or (
                 new == old
                 and (own_cost[j] < own_cost[best] or (own_cost[j] == own_cost[best] and j < best))
@@ -86,6 +85,6 @@ def warm() -> None:
     """Load the kernels from the cache, or compile them."""
     x, one = np.zeros((2, 1)), np.ones(1)
     cost, leaders = np.zeros(2), np.zeros(2, dtype=np.intp)
-    remember(x, x.copy(), cost.copy(), cost.copy(), cost, cost)
-    ring_leaders(cost, cost, 1, leaders)
+    remember(x, x.copy(), cost.copy(), cost.copy(), cost, cost, 0.0)
+    ring_leaders(cost, cost, 0.0, 1, leaders)
     move(x, x.copy(), x.copy(), leaders, np.zeros((2, 2, 1)), 0.5, 0.5, 0.5, -one, one, one)

@@ -9,7 +9,13 @@ import numpy as np
 
 from trajopt.arrays import Array, BoolArray
 from trajopt.errors import InfeasibleError
-from trajopt.optimize.ipopt import numpy_on_symbols, smooth_table, solve_program, stacked, variables
+from trajopt.optimize.symbols import (
+    numpy_on_symbols,
+    smooth_table,
+    solve_program,
+    stacked,
+    variables,
+)
 from trajopt.refine.jerk_start import least_time
 from trajopt.refine.smooth import SmoothMotion, rows_at, smooth_motion
 from trajopt.timing.trajectory import Trajectory

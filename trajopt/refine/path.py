@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array, require_finite, require_positive, require_whole
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.limits.limit import Limit
-from trajopt.optimize.ipopt import (
+from trajopt.optimize.symbols import (
     matrix,
     numpy_on_symbols,
     solve_program,

@@ -19,7 +19,7 @@ from trajopt.arrays import Array
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.limits.speed_bound import SpeedProfile
-from trajopt.optimize.ipopt import numpy_on_symbols, solve_program, stacked, total, variables
+from trajopt.optimize.symbols import numpy_on_symbols, solve_program, stacked, total, variables
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.timing.scaling import time_scale

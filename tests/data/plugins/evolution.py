@@ -3,18 +3,13 @@ restarts."""
 
 import numpy as np
 
-from trajopt.optimize.base import Run, better, checked_bounds, checked_x0
+from trajopt.optimize.base import better
 
 
 class EvolutionStrategy:
     name = "evolution-strategy"
     needs = frozenset()
     stochastic = True
-
-    def minimize(self, objective, bounds, *, x0=None, rng, budget, progress=None):
-        box = checked_bounds(bounds, objective.dimension)
-        run, start = Run(objective, box, budget, progress), checked_x0(x0, box)
-        return run.finish(self.name, lambda: self.search(run, start, rng))
 
     def search(self, run, start, rng):
         (low, high), step = run.bounds.T, 0.0

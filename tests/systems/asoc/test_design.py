@@ -39,7 +39,9 @@ CONSTRAINED = {
     "trust-constr",
     "differential-evolution",
     "cma-es",
-    "hybrid",
+    "cobyqa",
+    "ipopt+newton",
+    "lattice+ipopt+newton",
 }
 # Swarms without damping [guzman2015] end 1-3 % short whatever one swarm may use: they get more, in
 # restarts.

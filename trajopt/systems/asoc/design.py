@@ -171,9 +171,10 @@ class AsocDesign:
         """
         low, high = self.bounds.T
         columns = tuple(np.clip(np.asarray(candidates, dtype=np.float64), low, high).T)
-        room, battery = self.slack(*columns)
-        violation = np.maximum(-room, 0.0) + np.maximum(-battery, 0.0)
-        return Evaluation(-np.asarray(self.total(*columns)), violation)
+        slack = np.column_stack(self.slack(*columns))
+        violation = np.maximum(-slack, 0.0).sum(axis=1)
+        limits = np.array([[0.0, 0.0], [np.inf, np.inf]])
+        return Evaluation(-np.asarray(self.total(*columns)), violation, slack, limits)
 
     def term_values(self, candidates: Array) -> tuple[Array, Array]:
         """Terms (n, 5), in the order of TERMS, and violations (n,) of candidates (n, 4): for Pareto

@@ -18,7 +18,8 @@ from trajopt.arrays import Array, fold
 from trajopt.errors import InfeasibleError
 from trajopt.objectives.clearance import ClearObjective
 from trajopt.objectives.terminal import TerminalObjective
-from trajopt.optimize.base import Budget, Optimizer, Progress
+from trajopt.optimize.base import Budget, Optimizer
+from trajopt.optimize.run import Progress
 from trajopt.optimize.search import minimize
 from trajopt.paths.path import Path
 from trajopt.problem import Problem
