@@ -17,6 +17,7 @@ from trajopt.errors import ArgumentError, MissingDependencyError, SimulationErro
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
 from trajopt.simulate.mjspec import STEERING_RATE, SpecBuilder
 from trajopt.simulate.model import Model, cross, quaternion_of
+from trajopt.simulate.motors import Motors
 from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
@@ -116,6 +117,8 @@ class _Session:
         self.before: Array | None = None
         self.motors = [s for s, driven in zip(model.spins, model.driven, strict=True) if driven]
         self.rotors = [int(compiled.joint(f"rotor_link_{s}").dofadr[0]) for s in self.motors]
+        self.tendons = [int(compiled.tendon(f"motor_link_{s}").id) for s in self.motors]
+        self.torques = Motors(model)
         # of every geom: the robot's link, the stage's solid; -1 for none
         owner = {b: i for i, b in enumerate(body)}
         self.link_of = np.array([owner.get(int(b), -1) for b in compiled.geom_bodyid])
@@ -164,6 +167,11 @@ class _Session:
             self.data.mocap_pos[self.mocap] = self.plates.place
             self.data.mocap_quat[self.mocap] = self.plates.quaternions()
         self.data.qvel[self.rotors] = wheel_speeds[self.driven]
+        if self.torques.curves:
+            speeds = self.data.qvel[[self.rate[i] for i in self.motors]]
+            self.compiled.tendon_frictionloss[self.tendons] = self.torques.most(
+                speeds, wheel_speeds[self.driven]
+            )
         self.data.ctrl[:] = self._leading(angles)
         self.mujoco.mj_step(self.compiled, self.data)
 

@@ -17,13 +17,13 @@ from trajopt.paths.samples import require_moving
 from trajopt.robots.robot import Robot
 from trajopt.timing.cells import Measure
 from trajopt.timing.compiled import forward_profile
+from trajopt.timing.curved import source_of
 from trajopt.timing.engines import ENGINES, pick_engine, require_engine
 from trajopt.timing.fastest import Ask, Stuck, fastest
 from trajopt.timing.feasibility import require_motion
 from trajopt.timing.grid import MOST_REFINED, graded_grid, initial_grid, insert, placed, split
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.overspeed import yielding
-from trajopt.timing.curved import source_of
 from trajopt.timing.rests import AT, with_rests
 from trajopt.timing.segments import segment_ceiling
 from trajopt.timing.stages import FineRows, Stages, check, fine_rows, refined, stages_of
