@@ -28,6 +28,10 @@ _NO_GRAPHICS: list[str] = []
 # Impedances of soft contacts, which act like mass the more the closer they are to 1; chosen: at 0.5 a
 # tall robot on tyres rocks until it falls over, at 0.9 rollers come down so hard that loads scatter
 TYRE_IMPEDANCE, ROLLER_IMPEDANCE = 0.9, 0.5
+# s, time constant of friction of soft rollers; chosen: sliding at v, MuJoCo lifts a soft contact by
+# about friction v / time over its stiffness, and the wheels of a rim that slides would take over load
+# from those that do not (at 4 ms a sixth of it, and a Mecanum robot planned beyond its grip held)
+ROLLER_FRICTION_TIME = 0.05
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -146,6 +150,8 @@ class _Session:
             weight = (1.0 - d) * compiled.body_invweight0[compiled.geom_bodyid[geom], 0]
             compiled.pair_solref[pair] = [-soft[0] * weight, -soft[1] * weight]
             compiled.pair_solimp[pair] = [d, d, 0.001, 0.5, 2.0]
+            if link.joint.role == "roller":
+                compiled.pair_solreffriction[pair] = [ROLLER_FRICTION_TIME, 1.0]
             if compiled.geom_type[geom] == self.mujoco.mjtGeom.mjGEOM_SPHERE:
                 compiled.geom_size[geom, 0] += TYRE_SAG / 2.0
                 compiled.geom_rbound[geom] += TYRE_SAG / 2.0
