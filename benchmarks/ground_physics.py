@@ -23,6 +23,7 @@ from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path
 from trajopt.robots import Robot, robot
+from trajopt.robots.description import Sharing
 from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.simulate.check import ValidationReport, validate
 from trajopt.simulate.engine import ENGINES, make_engine
@@ -87,10 +88,12 @@ def ground_of(name: str, place: str, friction: float) -> Ground:
     return Plane(math.atan(ROBOTS[name] * friction), math.pi / 2)
 
 
-def plan(name: str, place: str, friction: float, share: float) -> Trajectory:
+def plan(
+    name: str, place: str, friction: float, share: float, rule: Sharing | None = None
+) -> Trajectory:
     """A slight bend along the contour or, on the other grounds, between it and uphill; robots that
-    can keep their heading. ``share`` is that of what all wheels
-    together can hold, in force and yaw moment: the limit at which they slide."""
+    can keep their heading. The slip limit has ``share`` of the friction, by the ``rule`` or, None,
+    the robot's own."""
     machine, turn = robot(name), 0.0 if place == "contour" else math.pi / 4
     points = np.array([[0.0, 0.0], [LENGTH / 2, BEND], [LENGTH, 0.0]])
     cos, sin = math.cos(turn), math.sin(turn)
@@ -98,7 +101,7 @@ def plan(name: str, place: str, friction: float, share: float) -> Trajectory:
     path = Path.through(
         points @ np.array([[cos, sin], [-sin, cos]]), heading=[0.0, 0.0, 0.0] if keeps else None
     )
-    limits = (Speed(SPEED), Slip(share * friction, rule="capacity"), Tip(), Contact(LOAD))
+    limits = (Speed(SPEED), Slip(share * friction, rule=rule), Tip(), Contact(LOAD))
     return time_scale(path, limits, robot=machine, ground=ground_of(name, place, friction))
 
 
@@ -172,9 +175,9 @@ def safe_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[
 
 
 def beyond_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[float]) -> Rows:
-    """Motions planned with BEYOND of the friction."""
+    """Motions planned with BEYOND of the friction that all wheels have together."""
     for name, place, friction in product(names, GROUNDS, frictions):
-        trajectory = plan(name, place, friction, BEYOND)
+        trajectory = plan(name, place, friction, BEYOND, "capacity")
         for engine in engines:
             share, off = "left physics", ""
             try:
@@ -211,14 +214,14 @@ def main() -> None:
     motion = ("robot", "ground", "friction", "engine")
     tables = [
         ResultTable(
-            f"Planned with {SAFE:.0%} of the friction",
+            f"Planned with {SAFE:.0%} of the friction, by each robot's own rule",
             (*motion, "duration [s]", "open loop: off [% of way]", "closed loop: off [mm]",
              "slip, open [% of speed]", "slip, closed [%]", "steering off [rad]",
              "loads off [% of weight]"),
             list(safe_rows(*cases)),
         ),
         ResultTable(
-            f"Planned with {BEYOND:.0%} of the friction",
+            f"Planned with {BEYOND:.0%} of the friction of all wheels together",
             (*motion, "slip [% of speed]", "off [% of way]"),
             list(beyond_rows(*cases)),
         ),
