@@ -286,8 +286,9 @@ class Swarm:
         else:
             self._move_readably(r)
         if rules.boundary in ("reset", "reflect", "mirror", "absorb"):
-            rows, columns = ((x < low) | (x > high)).nonzero()
-            if len(rows):
+            outside = (x < low) | (x > high)
+            if outside.any():
+                rows, columns = outside.nonzero()
                 _bring_back(rules.boundary, x, v, low, high, rows, columns, self.rng)
 
     def _move_readably(self, r: Array) -> None:
