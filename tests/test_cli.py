@@ -66,7 +66,7 @@ def test_a_solution_that_does_not_hold_exits_with_one():
         (("solve", "nowhere.toml"), "existing file"),
         (("solve", SCENARIO, "--set", "limits.sped=1"), "nearest is 'speed'"),
         (("solve", SCENARIO, "--set", "limits"), "key=value"),
-        (("solve", SCENARIO, "--optimizer", "magic"), "one of pso"),
+        (("solve", SCENARIO, "--optimizer", "magic"), "one of auto, pso"),
         (("solve", SCENARIO, "--seed", "-1"), "whole number"),
         (("solve", SCENARIO, "--seconds", "0"), "budget.seconds = 0.0"),
         (("solve", "problems/powerbot/experiment_1.toml", "--optimizer", "pso"), "not searched"),

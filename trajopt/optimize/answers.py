@@ -24,8 +24,8 @@ class Answers:
         try:
             if isinstance(answer, BaseException):
                 raise answer
-            cost = np.array(answer.cost, dtype=np.float64)
-            violation = np.array(answer.violation, dtype=np.float64)
+            cost = np.asarray(answer.cost, dtype=np.float64)
+            violation = np.asarray(answer.violation, dtype=np.float64)
             if cost.shape != (n,) or violation.shape != cost.shape:
                 raise ValueError(f"the objective returned shape {cost.shape} for {n} candidates")
             values = answer.constraints

@@ -15,6 +15,7 @@ from trajopt.optimize.process import interrupted
 from trajopt.optimize.record import Record
 
 _UNLIMITED = 2**62
+_ROUNDING = 8 * float(np.finfo(float).eps)  # to which a known optimum is met
 
 
 @dataclass
@@ -107,13 +108,8 @@ class Limited(Record):
         if interrupted():
             self.stop(Status.INTERRUPTED)
         target = self.budget.target
-        # A known optimum is met to rounding.
-        rounding = 8 * np.finfo(float).eps * abs(target or 0.0)
-        if (
-            target is not None
-            and self.best_violation <= FEASIBLE
-            and self.best_cost <= target + rounding
-        ):
+        met = target is not None and self.best_cost <= target + _ROUNDING * abs(target)
+        if met and self.best_violation <= FEASIBLE:
             self.stop(Status.TARGET)
         if self._late() and not (before and self.nfev == 0):
             self._over(Status.SECONDS)

@@ -18,7 +18,7 @@ Velocities start at zero. w_k = w, or falls linearly from ``inertia`` to ``final
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -37,7 +37,9 @@ from trajopt.optimize.violations import Levels
 Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
 _REPAIRED = 10  # iterations between repairs of the best where there are equalities, chosen
-_CLAN = 0.03  # of the width: spread of a clan, chosen
+_CLAN, _SPREAD = 3, 0.03  # particles of a clan, and their spread in widths; chosen
+_MOST = 50  # particles in clans, chosen
+_FEWEST = 13  # particles that a population by dimension has at least
 _CHOICES = {
     "topology": ("gbest", "ring"),
     "boundary": ("reset", "reflect", "mirror", "absorb", "invisible", "none"),
@@ -57,6 +59,9 @@ class ParticleSwarm:
     counts as infeasible. ``start``: "uniform" draws positions uniformly; "grid" lays the first two
     variables on a grid (Table 5.4); "sobol" takes a Sobol sequence with a random shift.
     ``velocity_limit``: largest velocity as a share of the width of the bounds; None: unlimited.
+    ``particles``: None for 12 + 2 sqrt(d), so many that a budget of some 1,000 d is best used.
+    ``horizon``: iterations over which the inertia falls; None: over the budget, evaluations or
+    seconds, whichever goes first.
     ``stagnation``: iterations without improvement after which the search ends; None: never.
     ``restart``: where the search would end by itself (stagnation, collapse, all particles lost), a
     new swarm starts instead, its first particle on the best candidate so far; then only the budget
@@ -68,7 +73,7 @@ class ParticleSwarm:
     stochastic: ClassVar[bool] = True
     saves: ClassVar[bool] = True
 
-    particles: int = 50  # [guzman2015], section 4.2.2
+    particles: int | None = 50  # [guzman2015], section 4.2.2
     inertia: float = 0.7298  # [clerc2002]: constriction factor for phi = 4.1
     cognitive: float = 1.49618  # 0.7298 * 2.05, the same source
     social: float = 1.49618
@@ -80,17 +85,17 @@ class ParticleSwarm:
         None  # the constriction factor makes one unnecessary, [clerc2002]
     )
     final_inertia: float | None = None
-    horizon: int = 500  # iterations, [guzman2015] Table 5.8
+    horizon: int | None = None  # iterations
     stagnation: int | None = None
     restart: bool = False
 
     def __post_init__(self) -> None:
-        if self.particles < 2:
+        if self.particles is not None and self.particles < 2:
             raise ArgumentError("particles", self.particles, "at least 2")
         for option, choices in _CHOICES.items():
             if getattr(self, option) not in choices:
                 raise ArgumentError(option, getattr(self, option), "one of " + ", ".join(choices))
-        if not 1 <= self.neighbours < self.particles:
+        if not 1 <= self.neighbours < (self.particles or _FEWEST):
             raise ArgumentError(
                 "neighbours", self.neighbours, "a whole number from 1 to particles - 1"
             )
@@ -98,8 +103,8 @@ class ParticleSwarm:
             raise ArgumentError(
                 "velocity_limit", self.velocity_limit, "a share of the width > 0, or None"
             )
-        if self.horizon < 1:
-            raise ArgumentError("horizon", self.horizon, "at least 1 iteration")
+        if self.horizon is not None and self.horizon < 1:
+            raise ArgumentError("horizon", self.horizon, "at least 1 iteration, or None")
         if self.stagnation is not None and self.stagnation < 1:
             raise ArgumentError("stagnation", self.stagnation, "at least 1 iteration, or None")
 
@@ -112,9 +117,13 @@ class ParticleSwarm:
         """
         warm()
         run.constructed()
-        swarm = self.swarm(run.bounds, rng, x0=x0)
-        if self.start != "grid":
-            _clans(run, swarm)
+        own = getattr(run.objective, "starts", list)() if self.start != "grid" else ()
+        options = self
+        if len(own) and self.particles is None:
+            options = replace(self, particles=min(_MOST, max(_FEWEST, _CLAN * len(own))))
+        swarm = options.swarm(run.bounds, rng, x0=x0)
+        if len(own) and not run.resumes:
+            _clans(own, run, swarm)
         ended = self._search(run, swarm)
         while self.restart:
             best = None if run.best_x is None else np.clip(run.best_x, *run.bounds.T)
@@ -125,9 +134,11 @@ class ParticleSwarm:
         """A swarm of one's own to drive: ``x = swarm.ask()``, evaluate, ``swarm.tell(cost,
         violation)``."""
         box = checked_bounds(bounds)
+        # Tuned with the inertia of ``local_best``: benchmarks/peers/swarms.py.
+        particles = self.particles or int(12 + 2 * len(box) ** 0.5)
         return Swarm.begin(
             SwarmRules(
-                self.particles,
+                particles,
                 self.inertia,
                 self.cognitive,
                 self.social,
@@ -150,6 +161,7 @@ class ParticleSwarm:
         inside = self.boundary != "none"
         levels = Levels(run)
         while True:
+            swarm.used = run.used
             asked = swarm.ask()
             if self.boundary != "invisible":
                 result = run.evaluate(asked, inside=inside)
@@ -178,14 +190,13 @@ class ParticleSwarm:
                 return Status.CONVERGED, f"no improvement in {self.stagnation} iterations"
 
 
-def _clans(run: Run, swarm: Swarm) -> None:
-    """Where the objective has starts of its own (routes on either side of obstacles), the last
-    particles begin around them, neighbours around the same one."""
-    if not hasattr(run.objective, "starts"):
-        return
-    own = run.objective.starts()[: len(swarm.x) // 2]
-    clans = np.repeat(own, len(swarm.x) // len(own), axis=0)
-    clans += _CLAN * run.width * swarm.rng.standard_normal(clans.shape)
+def _clans(own: Array, run: Run, swarm: Swarm) -> None:
+    """Let the last particles begin around the best of an objective's ``own`` starts (n, d),
+    neighbours around the same one."""
+    found = run.evaluate(own)
+    best = own[np.lexsort((found.cost, found.violation))[: len(swarm.x) // _CLAN]]
+    clans = np.repeat(best, _CLAN, axis=0)
+    clans += _SPREAD * run.width * swarm.rng.standard_normal(clans.shape)
     swarm.x[len(swarm.x) - len(clans) :] = np.clip(clans, *run.bounds.T)
 
 
@@ -196,13 +207,13 @@ def constriction() -> ParticleSwarm:
 
 
 def local_best() -> ParticleSwarm:
-    """Constriction on a ring of two neighbours, reflected at the bounds: the package's best preset.
+    """A small swarm on a ring whose inertia falls over the budget: the package's best preset.
 
-    Slower to converge than the global best, and so caught in fewer local minima: on the eight
-    problems of [guzman2015] through the actuators its median over seeds is the best value known, or
-    near it (docs/pso_vs_gradient.md).
+    The ring is caught in fewer local minima than the global best, few particles make the most of a
+    budget, and the falling inertia lets them range first and settle at its end
+    (benchmarks/peers/swarms.py compares it with other packages' swarms).
     """
-    return ParticleSwarm(topology="ring")
+    return ParticleSwarm(topology="ring", particles=None, inertia=0.8, final_inertia=0.5)
 
 
 def ring() -> ParticleSwarm:

@@ -40,13 +40,14 @@ class SwarmRules:
     start: str
     velocity_limit: float | None
     final_inertia: float | None
-    horizon: int
+    horizon: int | None
 
 
 @dataclass(eq=False)
 class Swarm:
     """Positions ``x``, velocities ``v``, own bests; mutable by nature. ``idle``: iterations since
-    it improved."""
+    it improved; ``used``: share of the budget that is used up, by which the inertia falls where the
+    rules have no horizon."""
 
     rules: SwarmRules
     bounds: Array
@@ -59,6 +60,7 @@ class Swarm:
     iteration: int = 0
     idle: int = 0
     level: float = FEASIBLE  # violation up to which candidates count as feasible
+    used: float = 0.0
     _reached: tuple[float, float] = (np.inf, np.inf)
 
     def __post_init__(self) -> None:
@@ -284,8 +286,9 @@ class Swarm:
         else:
             self._move_readably(r)
         if rules.boundary in ("reset", "reflect", "mirror", "absorb"):
-            rows, columns = ((x < low) | (x > high)).nonzero()
-            if len(rows):
+            outside = (x < low) | (x > high)
+            if outside.any():
+                rows, columns = outside.nonzero()
                 _bring_back(rules.boundary, x, v, low, high, rows, columns, self.rng)
 
     def _move_readably(self, r: Array) -> None:
@@ -307,7 +310,7 @@ class Swarm:
         rules = self.rules
         if rules.final_inertia is None:
             return rules.inertia
-        done = min(self.iteration / rules.horizon, 1.0)
+        done = min(self.iteration / rules.horizon, 1.0) if rules.horizon else self.used
         return rules.inertia + (rules.final_inertia - rules.inertia) * done
 
 
