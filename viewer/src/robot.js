@@ -5,7 +5,7 @@ import {
 } from "three";
 import { between, locate } from "./data.js";
 import { Merged } from "./merged.js";
-import { geometryOf } from "./shapes.js";
+import { geometryOf, MANY } from "./shapes.js";
 
 const MARK = new Color("#e8e8e4"); // of what shows how a wheel has turned
 const ROD = new Color("#5c6670"); // of what holds wheels
@@ -58,7 +58,10 @@ export class Robot {
     const { looks, geometries } = this.model;
     const material = new MeshLambertMaterial({ vertexColors: true });
     if (tint) Object.assign(material, { transparent: true, opacity: 0.34, depthWrite: false, ...BEHIND });
-    this.merged = new Merged(looks.map(({ shape, colour }) => ({
+    // Of a robot that is only hinted at, rollers are left out where they are many.
+    const bare = tint && this.model.count > MANY;
+    this.looks = looks.filter(({ link }) => !bare || this.model.data.roles[link] !== "roller");
+    this.merged = new Merged(this.looks.map(({ shape, colour }) => ({
       geometry: geometries[shape], colour: tint ? colour.clone().lerp(new Color(tint), 0.75) : colour,
     })));
     this.mesh = new Mesh(this.merged.geometry, material);
@@ -106,7 +109,7 @@ export class Robot {
       world[i].multiply(turn);
     }
     const placed = new Matrix4();
-    model.looks.forEach((look, k) => this.merged.place(k, placed.multiplyMatrices(world[look.link], look.pose).elements));
+    this.looks.forEach((look, k) => this.merged.place(k, placed.multiplyMatrices(world[look.link], look.pose).elements));
     this.merged.update();
     this.nose.mesh.matrix.multiplyMatrices(world[0], this.nose.look.pose);
     for (const { lines, look } of this.edges) lines.matrix.multiplyMatrices(world[look.link], look.pose);
