@@ -237,7 +237,9 @@ def _pass(ask: Ask, cells: Cells, tight: Array, constant: BoolArray) -> tuple[Ar
     from trajopt.timing import reach
 
     count, right = len(cells.d), cells.right
-    c = cells.table.c - tight[:, None] if tight.any() else cells.table.c
+    c = cells.table.c
+    if tight.any():
+        c = np.subtract(c, tight[:, None], out=cells.spare)
     rows = cells.table.a, cells.table.b, c
     top, bottom, rests = _ceilings(cells, c, cells.cap * (1 - tight))
     node = _nodes(ask, cells, top)
