@@ -6,6 +6,7 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.kernels import kernel
+from trajopt.paths.find import cell_at
 from trajopt.timing.planar_kernel import FEATURES, feature
 
 
@@ -52,16 +53,19 @@ def swivels(
     """
     count, node = len(trail), np.sqrt(3.0) / 6
     found = np.empty((len(u), count), dtype=np.complex128)
-    z = np.exp(1j * start)
+    z = np.empty(count, dtype=np.complex128)
+    for c in range(count):
+        z[c] = complex(np.cos(start[c]), np.sin(start[c]))
     f = np.empty((2, FEATURES))
-    segments = np.searchsorted(knots, u, side="right") - 1
+    i = 0
     for cell in range(len(d)):
-        found[left[cell]] = z
+        for c in range(count):
+            found[left[cell], c] = z[c]
         for half in range(2):
             j = left[cell] + 2 * half
             k = right[cell] if half else j + 2
             h = d[cell] / 2
-            i = min(max(segments[j], 0), len(cubics) - 1)
+            i = cell_at(knots, len(cubics), u[j], i)
             gone = 0.0
             for c in range(count):
                 px, py = pivots[c, 0], pivots[c, 1]
@@ -101,11 +105,12 @@ def swivels(
                         p = 0.5 * (p0 + p1) - cross * 2 * (q0 * q1.conjugate()).imag
                         q = 0.5 * (q0 + q1) - cross * 2j * (p0 * q1 - p1 * q0)
                         z[c] = _turned(p, q, z[c])
-                    if part == parts // 2 - 1:
-                        found[j + 1] = z
-                found[k] = z
+                        if part == parts // 2 - 1:
+                            found[j + 1, c] = z[c]
+                        found[k, c] = z[c]
             else:
-                z[:] = found[k]
+                for c in range(count):
+                    z[c] = found[k, c]
     return found
 
 
