@@ -7,6 +7,7 @@ import numpy as np
 from trajopt.arrays import Array, IndexArray
 from trajopt.kernels import kernel
 from trajopt.paths.find import cell_at
+from trajopt.robots.swivel import Complex
 from trajopt.timing.planar_kernel import FEATURES, feature
 
 
@@ -42,7 +43,7 @@ def swivels(
     pivots: Array,
     trail: Array,
     start: Array,
-) -> Array:
+) -> Complex:
     """(P, C): directions of castors, exp(i angle), at the places u (P,) of cells (``Cells``), whose
     features are ``at``, from ``start`` (C,), rad, on.
 
@@ -116,7 +117,7 @@ def swivels(
 
 @kernel(nogil=True)
 def standing(
-    directions: Array, place: Array, trail: Array, lateral: Array, castors: IndexArray, cog: Array
+    directions: Complex, place: Array, trail: Array, lateral: Array, castors: IndexArray, cog: Array
 ) -> Array:
     """(P, K, 2): contacts from the foot of the centre of gravity, m, at castors' directions
     (P, C), exp(i angle); ``place`` (K, 2) of wheels and pivots."""
