@@ -97,7 +97,8 @@ class Planar:
         from trajopt.timing import planar_kernel as kernels
 
         shape = (len(at), sum(block.rows for block in self.blocks))
-        a, b, c = np.empty(shape), np.empty(shape), np.empty(shape)
+        # One block: the allocator keeps it for the next call, several of its size it gives back.
+        a, b, c = np.empty((3, *shape))
         first, columns, matrices = 0, list[IndexArray](), list[Block]()
         for limit, block in zip(self.limits, self.blocks, strict=True):
             if block.moving:

@@ -6,6 +6,7 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.kernels import kernel
+from trajopt.paths.find import cell_at
 
 FEATURES = 11  # vx, vy, w, p per sigma, their derivatives along sigma, w^2, w vx, w vy
 
@@ -52,9 +53,9 @@ def feature(f: Array, t: float, length: float, free: bool, out: Array) -> float:
 def features(knots: Array, cubics: Array, length: float, free: bool, u: Array) -> Array:
     """(P, FEATURES) at spline parameters u (P,); ``length`` as in ``spread``."""
     found = np.empty((len(u), FEATURES))
-    segments = np.searchsorted(knots, u, side="right") - 1
+    i = 0
     for k in range(len(u)):
-        i = min(max(segments[k], 0), len(cubics) - 1)
+        i = cell_at(knots, len(cubics), u[k], i)
         feature(cubics[i], u[k] - knots[i], length, free, found[k])
     return found
 
@@ -84,8 +85,9 @@ def linear(
 @kernel(nogil=True)
 def speed_bounds(at: Array, speeds: Array, owner: IndexArray, bounds: Array) -> None:
     """Raises the bounds (L, P) on sigma'^2 from |speeds (Q, 4) . T| sigma' <= 1."""
-    bounds[:] = np.inf
     for k in range(len(at)):
+        for q in range(len(bounds)):
+            bounds[q, k] = np.inf
         for q in range(len(owner)):
             rate = (
                 speeds[q, 0] * at[k, 0]
@@ -167,7 +169,7 @@ def tip_rows(
 ) -> None:
     """As ``Tip``: the edge of the support that starts at each contact, if one does."""
     count = arms.shape[1]
-    follows = np.full(count, -1)
+    follows = np.empty(count, dtype=np.intp)
     for k in range(len(at)):
         ax, ay, bx, by = _force(at[k], cog)
         if k == 0 or not _surround(arms[k], follows):
