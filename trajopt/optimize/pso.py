@@ -117,7 +117,8 @@ class ParticleSwarm:
         """
         warm()
         run.constructed()
-        own = getattr(run.objective, "starts", list)() if self.start != "grid" else ()
+        offered = getattr(run.objective, "starts", tuple) if self.start != "grid" else tuple
+        own: Array = np.asarray(offered())
         options = self
         if len(own) and self.particles is None:
             options = replace(self, particles=min(_MOST, max(_FEWEST, _CLAN * len(own))))
