@@ -58,6 +58,7 @@ sheet: $(READY)  ## every figure on one sheet, out/contact_sheet.png, to be look
 
 pictures: $(READY)  ## rewrite the pictures of README.md (the climb study's: after its sweep, see benchmarks/readme_pictures.py)
 	$(BIN)/python -m benchmarks.readme_pictures
+	$(BIN)/python -m benchmarks.time_scaling_pictures
 
 clean:  ## remove everything that can be made again
 	rm -rf $(VENV) out build *.egg-info

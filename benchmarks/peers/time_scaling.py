@@ -217,7 +217,7 @@ def batch(repetitions: int) -> ResultTable:
 def whole_call(repetitions: int) -> ResultTable:
     """time_scale from path to checked trajectory: sampling, rows, refinement, margins on the fine
     grid."""
-    limits = (Slip(0.332), Tip(), WheelAcceleration(8.0), WheelSpeed(12.0), Speed(1.5))
+    limits = (Slip(0.332, rule="load"), Tip(), WheelAcceleration(8.0), WheelSpeed(12.0), Speed(1.5))
     rows = []
     for engine in ("compiled", "toppra"):
         result = time_scale(curve(), limits, robot=robot(), engine=engine)

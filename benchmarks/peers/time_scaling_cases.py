@@ -46,7 +46,7 @@ def force_stages(points: int, seed: int = 0) -> Stages:
     """Slip as a 16-gon, tip, wheel acceleration and wheel speed at ``points`` gridpoints."""
     path = curve(seed)
     u = np.linspace(path.start, path.end, points)
-    limits = (Slip(0.332), Tip(), WheelAcceleration(8.0), WheelSpeed(12.0))
+    limits = (Slip(0.332, rule="load"), Tip(), WheelAcceleration(8.0), WheelSpeed(12.0))
     return assemble(sample_at(path, path.parameter(u), u), limits, robot())
 
 

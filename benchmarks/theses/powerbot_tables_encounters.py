@@ -188,7 +188,7 @@ def with_friction(task: Problem, share: float) -> list[Limit]:
     kept: list[Limit] = [
         x for x in task.replace({"limits.variant": None}).limits if x.name not in ("slip", "tip")
     ]
-    return [*kept, Slip(share * FRICTION, per_wheel=True)]
+    return [*kept, Slip(share * FRICTION)]
 
 
 def slowest(run: Run) -> float:

@@ -36,6 +36,7 @@ KINDS = (
     "tricycle",
     "swerve",
 )
+DRIVEN = ("powerbot", "small-differential", "car", "swerve")  # all that hold, along and across
 GROUNDS = ("level", "plane", "ramp", "hills", "rough")
 
 
@@ -72,11 +73,12 @@ def random_path(one: Robot, rng: np.random.Generator) -> Path:
 
 
 def random_limits(one: Robot, rng: np.random.Generator) -> list:
+    other = rng.choice(["capacity", "load"] if one.name in DRIVEN else ["capacity"])
     radius = min(wheel.radius for wheel in one.description.wheels)
     limits = [
         Speed(rng.uniform(0.4, 1.5)),
         WheelSpeed(rng.uniform(0.5, 2.0) / radius),
-        Slip(rng.uniform(0.5, 0.9), per_wheel=bool(rng.random() < 0.5)),
+        Slip(rng.uniform(0.5, 0.9), rule="least_norm" if rng.random() < 0.5 else other),
         Tip(),
     ]
     if rng.random() < 0.5:

@@ -12,11 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import RegularGridInterpolator
+from limits.space_statics import G, capacity_used, slip_used, statics, tip_margin
 
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.contact import Contact
-from trajopt.limits.friction import Friction, FrictionAlong, FrictionMap
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.steering_acceleration import SteeringAcceleration
@@ -29,7 +28,6 @@ from trajopt.robots.robot import Robot
 from trajopt.timing.track import Track
 from trajopt.timing.trajectory import Trajectory
 
-G = 9.80665
 FIRST = np.array([1, -8, 0, 8, -1]) / 12
 SECOND = np.array([-1, 16, -30, 16, -1]) / 12
 
@@ -130,78 +128,6 @@ def contact_slips(robot: Robot, now: Instant) -> np.ndarray:
     return np.array(slips)
 
 
-@dataclass(frozen=True)
-class Statics:
-    """Force and moment that the ground gives the body, per mass in its axes, and loads (K,)."""
-
-    force: np.ndarray
-    moment: np.ndarray
-    arms: np.ndarray
-    loads: np.ndarray
-    cog: np.ndarray
-
-
-def statics(robot: Robot, now: Instant) -> Statics:
-    body = robot.body
-    acceleration = now.second(now.points(np.array(body.cog))) + np.array([0.0, 0.0, G])
-    force = now.axes.T @ acceleration
-    inertia = np.array([body.roll_inertia, body.pitch_inertia, body.yaw_inertia]) / body.mass
-    moment = now.axes.T @ now.moment(inertia)
-    arms = []
-    for k, wheel in enumerate(robot.description.wheels):
-        angle = wheel.angle + now.steering[2, k]
-        c, s = np.cos(angle), np.sin(angle)
-        x = wheel.position[0] - wheel.trail * c - wheel.lateral * s
-        y = wheel.position[1] - wheel.trail * s + wheel.lateral * c
-        arms.append([x - body.cog[0], y - body.cog[1], -body.cog[2]])
-    arms = np.array(arms)
-    # the tangential forces all act at the contacts' height: only their sum tips the body
-    tilt = moment - np.cross([0.0, 0.0, -body.cog[2]], [force[0], force[1], 0.0])
-    balance = np.vstack([np.ones(len(arms)), arms[:, 1], -arms[:, 0]])
-    loads = np.linalg.lstsq(balance, np.array([force[2], tilt[0], tilt[1]]))[0]
-    return Statics(force, moment, arms, loads, np.array(body.cog))
-
-
-def shares(robot: Robot, now: Instant, found: Statics) -> dict[int, np.ndarray]:
-    """Least-norm force of every wheel that can hold, in the body's x and y, per mass."""
-    driven = {name for motor in robot.description.motors for name in motor.wheels}
-    pivots = [set(p.wheels) for p in robot.description.pivots]
-    together = set().union(*pivots) if pivots else set()
-    pivots += [{w.name} for w in robot.description.wheels if w.kind == "castor"]
-    pivots = [p for p in pivots if p & driven and not (len(p) == 1 and p <= together)]
-    columns, owner = [], []
-    for k, wheel in enumerate(robot.description.wheels):
-        angle = wheel.angle + now.steering[2, k]
-        if wheel.rollers is not None:
-            angles = [angle + wheel.rollers.angle] if wheel.name in driven else []
-        elif wheel.kind == "spherical" or (
-            wheel.kind == "castor" and not any(wheel.name in p for p in pivots)
-        ):
-            angles = []
-        else:
-            angles = [angle] if wheel.name in driven else []
-            angles.append(angle + np.pi / 2)
-        for direction in angles:
-            columns.append([np.cos(direction), np.sin(direction)])
-            owner.append(k)
-    d, at = np.array(columns), found.arms[owner]
-    rows = [d[:, 0], d[:, 1], at[:, 0] * d[:, 1] - at[:, 1] * d[:, 0]]
-    wanted = [found.force[0], found.force[1], found.moment[2]]
-    for pivot in pivots:
-        lever = []
-        for k, e in zip(owner, d, strict=True):
-            wheel = robot.description.wheels[k]
-            arm = found.arms[k, :2] + np.array(robot.body.cog[:2]) - np.array(wheel.position)
-            lever.append(arm[0] * e[1] - arm[1] * e[0] if wheel.name in pivot else 0.0)
-        rows.append(np.array(lever))
-        wanted.append(0.0)
-    forces = np.linalg.lstsq(np.array(rows), np.array(wanted))[0]
-    return {
-        k: sum(f * e for f, e, o in zip(forces, d, owner, strict=True) if o == k)
-        for k in dict.fromkeys(owner)
-    }
-
-
 def used(robot: Robot, limits: Sequence, now: Instant) -> dict[str, float]:
     """How much of every limit an instant uses; 1 is all of it."""
     velocity = now.rate(now.position)
@@ -238,7 +164,8 @@ def used(robot: Robot, limits: Sequence, now: Instant) -> dict[str, float]:
             case Contact():
                 found[limit.name] = 1 - there.loads.min() / (G / len(there.loads))
             case Slip():
-                found[limit.name] = slip_used(robot, now, there, limit)
+                check = capacity_used if limit.rule == "capacity" else slip_used
+                found[limit.name] = check(robot, now, there, limit)
             case _:
                 raise NotImplementedError(limit)
     return found
@@ -254,57 +181,3 @@ def _group(robot: Robot, now: Instant, derivative) -> np.ndarray:
     steered = [k for k, w in enumerate(robot.description.wheels) if w.kind == "steered"]
     assert all(len(g.wheels) == 1 for g in robot.description.steering)
     return derivative(now.steering)[steered]
-
-
-def tip_margin(found: Statics) -> float:
-    """Load on the far side of the edge that tips first: over every pair of contacts with all
-    others on one side."""
-    least, points = np.inf, found.arms[:, :2]
-    centre = np.array([found.loads @ points[:, 0], found.loads @ points[:, 1]])
-    for i in range(len(points)):
-        for j in range(len(points)):
-            edge = points[j] - points[i]
-            length = np.hypot(*edge)
-            if length < 1e-9:
-                continue
-            normal = np.array([edge[1], -edge[0]]) / length
-            distance = float(normal @ points[i])
-            if np.all(points @ normal <= distance + 1e-12):
-                least = min(least, (found.loads.sum() * distance - normal @ centre) / distance)
-    return float(least)
-
-
-def slip_used(robot: Robot, now: Instant, there: Statics, limit: Slip) -> float:
-    return max(
-        force / max(hold, 1e-9) for force, hold in forces_and_holds(robot, now, there, limit)
-    )
-
-
-def forces_and_holds(
-    robot: Robot, now: Instant, there: Statics, limit: Slip
-) -> list[tuple[float, float]]:
-    """Force and friction times load, m/s^2, of every wheel that holds, or of all together."""
-    driven = {name for motor in robot.description.motors for name in motor.wheels}
-    wheels, mu = robot.description.wheels, friction_under(now, there, limit.friction)
-    forces = shares(robot, now, there)
-    alone = all(wheels[k].kind in ("fixed", "steered") and wheels[k].name in driven for k in forces)
-    if alone and not limit.per_wheel:
-        hold = sum(mu[k] * there.loads[k] for k in forces)
-        return [(float(np.hypot(*there.force[:2])), hold)]
-    return [(float(np.hypot(*f)), mu[k] * there.loads[k]) for k, f in forces.items()]
-
-
-def friction_under(now: Instant, there: Statics, friction: Friction) -> np.ndarray:
-    """(K,) under every wheel."""
-    count = len(there.loads)
-    if isinstance(friction, FrictionAlong):
-        return np.full(count, np.interp(now.s, friction.places, friction.values))
-    if isinstance(friction, FrictionMap):
-        places = now.position[2] + (there.arms + there.cog) @ now.axes.T
-        rows, columns = np.shape(friction.values)
-        x, y = (
-            friction.origin[k] + friction.spacing * np.arange(n)
-            for k, n in ((0, columns), (1, rows))
-        )
-        return RegularGridInterpolator((x, y), np.asarray(friction.values).T)(places[:, :2])
-    return np.broadcast_to(np.asarray(friction, dtype=float), (count,))

@@ -10,8 +10,8 @@ from scipy.optimize import brentq
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.contact import Contact
-from trajopt.limits.forces import contact_loads
 from trajopt.limits.friction import FrictionAlong, FrictionMap
+from trajopt.limits.loads import contact_loads
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip, moving_edges, support_edges

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from limits.slopes import GENTLE, G, along_of
 
-from trajopt.limits.forces import contact_loads, contact_points, ground_moment, specific_force
+from trajopt.limits.forces import contact_points, ground_moment, specific_force
 from trajopt.limits.grip import contact_forces, holds_of
+from trajopt.limits.loads import contact_loads
 from trajopt.paths.path import Path
 from trajopt.robots.robot import robot, robot_names
 from trajopt.timing.track import track
@@ -68,9 +69,13 @@ def test_driving_on_a_plane_in_closed_form(name, degrees):
                 lever = np.sum(load * arms[..., axis], axis=1)
                 np.testing.assert_allclose(lever, -h * f[:, axis], atol=1e-9)
             for i in range(0, len(s), 5):  # equal stiffness everywhere: one plane of loads
-                basis = np.column_stack([np.ones(len(arms[i])), arms[i]])
-                fit = basis @ np.linalg.lstsq(basis, load[i])[0]
-                np.testing.assert_allclose(load[i], fit, atol=1e-9)
+                place, borne = arms[i], load[i]
+                if name.startswith("asoc"):  # of the axles, whose two wheels level out
+                    place = place.reshape(-1, 2, 2).mean(axis=1)
+                    borne = borne.reshape(-1, 2).sum(axis=1)
+                basis = np.column_stack([np.ones(len(place)), place])
+                fit = basis @ np.linalg.lstsq(basis, borne)[0]
+                np.testing.assert_allclose(borne, fit, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["loc8", "omni-3", "asoc-4", "swerve"])

@@ -57,7 +57,7 @@ def duration(
         Speed(1.2),
         WheelSpeed(1.4 / radius),
         WheelAcceleration(2.0 / radius),
-        Slip(0.8, per_wheel=one.name in ("swerve", "car")),
+        Slip(0.8, rule="capacity" if one.name in ("powerbot", "car", "swerve") else "least_norm"),
         Tip(),
         Contact(),
     ]

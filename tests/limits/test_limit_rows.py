@@ -8,7 +8,8 @@ import pytest
 from benchmarks.theses.textbook import planar, wheel
 from trajopt.errors import ArgumentError
 from trajopt.limits.acceleration import Acceleration
-from trajopt.limits.forces import contact_loads, specific_force
+from trajopt.limits.forces import specific_force
+from trajopt.limits.loads import contact_loads
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.speed_bound import SpeedProfile, SpeedZones
@@ -90,7 +91,7 @@ def test_slip_is_the_formula_of_two_axles():
     states."""
     rng = np.random.default_rng(1)
     samples = sample_path(CURVE, np.linspace(0.1, CURVE.length - 0.1, 40))
-    rows = Slip(MU, sides=16).rows(samples, powerbot_like())
+    rows = Slip(MU, sides=16, rule="load").rows(samples, powerbot_like())
     u, x = rng.uniform(-2, 2, (40, 1)), rng.uniform(0, 2, (40, 1))
     f_t, f_n = u, samples.curvature[:, None] * x
     angles = (np.arange(16) + 0.5) * np.pi / 8
@@ -229,7 +230,7 @@ def test_mecanum_slip_by_hand():
     by h a."""
     mover, mu, push = robot("loc8"), 0.4, 1.0
     straight = Path.through([[0, 0], [2, 0]], heading=[0, 0], turning_length=0.5)
-    rows = Slip(mu).rows(sample_path(straight, np.array([1.0])), mover)
+    rows = Slip(mu, rule="least_norm").rows(sample_path(straight, np.array([1.0])), mover)
     used = (rows.a * push - rows.c)[0].reshape(4, 2).max(axis=1)
     shift = mover.body.cog[2] * push / (4 * 0.376)
     loads = G / 4 + np.array([-shift, -shift, shift, shift])
@@ -246,10 +247,10 @@ def test_per_wheel_slip_is_stricter_in_a_curve_and_equal_on_a_straight():
             np.where(rows.b > 1e-9, rows.c / np.where(rows.b > 1e-9, rows.b, 1), np.inf), axis=1
         )
 
-    assert np.all(top_speed(Slip(0.5, per_wheel=True)) <= top_speed(Slip(0.5)) * (1 + 1e-9))
+    assert np.all(top_speed(Slip(0.5)) <= top_speed(Slip(0.5, rule="load")) * (1 + 1e-9))
     straight = sample_path(slope_path(0.1), np.array([1.0]))
     top = []
-    for limit in (Slip(0.5), Slip(0.5, per_wheel=True)):
+    for limit in (Slip(0.5, rule="load"), Slip(0.5)):
         rows = limit.rows(straight, mover)
         top.append(np.min(rows.c[rows.a > 1e-9] / rows.a[rows.a > 1e-9]))
     assert top[0] == pytest.approx(top[1], rel=1e-9)

@@ -28,7 +28,7 @@ def test_pushing_and_braking_slip_at_the_same_force(heading: float, arm: float) 
     """
     robot = shipped("loc8")
     straight = Path.through([[0, 0], [2, 0]], heading=[heading, heading], turning_length=0.5)
-    rows = Slip(MU).rows(sample_path(straight, np.array([1.0])), robot)
+    rows = Slip(MU, rule="least_norm").rows(sample_path(straight, np.array([1.0])), robot)
     pushing, slowing = rows.a > 1e-9, rows.a < -1e-9
     expected = MU * G / (np.sqrt(2) + MU * robot.body.cog[2] / arm)
     assert np.min(rows.c[pushing] / rows.a[pushing]) == pytest.approx(expected, rel=1e-9)
@@ -65,7 +65,7 @@ def test_roller_forces_move_the_body_as_it_moves(s0: float, u: float, x: float) 
     )[0]
     loads = G / 4 - h * ax * arms[:, 0] / np.sum(arms[:, 0] ** 2)
     loads -= h * ay * arms[:, 1] / np.sum(arms[:, 1] ** 2)
-    rows = Slip(MU).rows(sample_path(TURNING, np.array([s0])), robot)
+    rows = Slip(MU, rule="least_norm").rows(sample_path(TURNING, np.array([s0])), robot)
     used = (rows.a * u + rows.b * x - rows.c)[0]
     expected = np.concatenate([force - MU * loads, -force - MU * loads])
     np.testing.assert_allclose(np.sort(used), np.sort(expected), atol=1e-6)

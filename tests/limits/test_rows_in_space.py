@@ -7,12 +7,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from limits.space_check import contact_slips, forces_and_holds, instant_of, statics, used
+from limits.space_check import contact_slips, instant_of, used
+from limits.space_statics import forces_and_holds, statics
 from world.shapes import HILLS, TILTED, mesh_of
 
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.contact import Contact
 from trajopt.limits.friction import FrictionAlong, FrictionMap
+from trajopt.limits.grip import holds_of
 from trajopt.limits.limit import Limit, Rows
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
@@ -75,9 +77,9 @@ def limits_of(one: Robot, rng: np.random.Generator) -> list[Limit]:
         grid,
     )
     found: list[Limit] = [
-        Slip(mu, sides=SIDES, per_wheel=each, name=f"slip {i} {each}")
+        Slip(mu, sides=SIDES, rule=rule, name=f"slip {i} {rule}")  # type: ignore[arg-type]
         for i, mu in enumerate(frictions)
-        for each in (False, True)
+        for rule in (("least_norm", "load") if holds_of(one).all_drive else ("least_norm",))
     ]
     found += [
         Speed(1.3),

@@ -24,7 +24,7 @@ from trajopt.world.ramp import Ramp, Ramps
 
 def test_along_the_contour_of_8_5_degrees():
     samples = rest_on(robot("powerbot"), np.radians(8.5), 0.0)
-    rows = Slip(0.332, sides=720).rows(samples, robot("powerbot"))
+    rows = Slip(0.332, sides=720, rule="load").rows(samples, robot("powerbot"))
     up, down = rows.a[0] > 1e-9, rows.a[0] < -1e-9
     assert np.min(rows.c[0, up] / rows.a[0, up]) == pytest.approx(1.05, abs=0.005)
     assert np.max(rows.c[0, down] / rows.a[0, down]) == pytest.approx(-1.91, abs=0.005)
@@ -68,10 +68,10 @@ def test_a_circle_of_two_metres_on_8_5_degrees():
         np.testing.assert_allclose(contact_points(samples, one)[0, 2:], trailing(2.0), atol=1e-5)
         steady = brentq(over, low, 2.8, args=(side,))
         assert steady == pytest.approx(expected, abs=0.005)
-        needed = Slip(0.332).needed(samples, one, np.zeros(1), np.array([steady**2]))
+        needed = Slip(0.332, rule="load").needed(samples, one, np.zeros(1), np.array([steady**2]))
         assert needed[0] == pytest.approx(1.0, abs=6e-4)  # a spline through points on the circle
     few = Path.through(plan[::4], start_direction=(1, 0), end_direction=(-1, 0))
-    lapped = time_scale(few, [Slip(0.332, sides=256), Tip()], robot=one, ground=plane)
+    lapped = time_scale(few, [Slip(0.332, sides=256, rule="load"), Tip()], robot=one, ground=plane)
     assert np.interp(lap, lapped.s, lapped.sd) == pytest.approx(1.06, abs=0.005)
 
 
@@ -88,21 +88,23 @@ def test_slope_at_which_a_high_robot_tips(heading, tangent):
 
 
 def test_slopes_that_slide_at_rest():
-    """Across, the drive wheels alone hold PowerBot up to 11.6 deg; four wheels that hold, 18.4."""
+    """Across, the drive wheels alone hold PowerBot up to 11.6 deg, as far as force goes; four wheels
+    that hold, 18.4."""
     drive, four = robot("powerbot"), robot("swerve")
     for one, tangent in ((drive, 0.332 * 0.218 / 0.35), (four, 0.332)):
         slope, still = np.arctan(tangent), np.zeros(1)
         samples = rest_on(one, slope, 0.0)
-        assert Slip(0.332).needed(samples, one, still, still)[0] == pytest.approx(1.0, rel=1e-9)
+        slip = Slip(0.332, rule="load")
+        assert slip.needed(samples, one, still, still)[0] == pytest.approx(1.0, rel=1e-9)
     assert np.degrees(np.arctan(0.332 * 0.218 / 0.35)) == pytest.approx(11.6, abs=0.1)
     for degrees, times in ((15, 1.30), (30, 2.8)):
         samples = rest_on(drive, np.radians(degrees), 0.0)
-        needed = Slip(0.33).needed(samples, drive, still, still)[0]
+        needed = Slip(0.33, rule="load").needed(samples, drive, still, still)[0]
         assert needed == pytest.approx(times, abs=0.02)
         with pytest.raises(InfeasibleError, match="slip"):
             time_scale(
                 Path.through([[0, 0], [5, 0]]),
-                [Speed(1.0), Acceleration(0.5, 0.5), Slip(0.33), Tip()],
+                [Speed(1.0), Acceleration(0.5, 0.5), Slip(0.33, rule="load"), Tip()],
                 robot=drive,
                 ground=Plane(np.radians(degrees), UP),
             )
@@ -162,7 +164,7 @@ def test_a_path_in_space_lies_on_the_ground_or_is_refused(kind, name):
     plan = path.position(np.linspace(path.start, path.end, 400))
     height = ground.partial(plan[:, 0], plan[:, 1], 0, 0)
     on = Path.through(np.column_stack([plan[:, :2], height]))
-    limits = [*DRIVE, Slip(0.9), Tip()]
+    limits = [*DRIVE, Slip(0.9, rule="load"), Tip()]
     found = time_scale(on, limits, robot=one, ground=ground, gridpoints=400)
     laid = time_scale(path, limits, robot=one, ground=ground, gridpoints=400)
     assert found.duration == pytest.approx(laid.duration, rel=1e-3)

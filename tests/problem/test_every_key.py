@@ -234,6 +234,7 @@ ROWS = {
     "limits.power": Row("path", 20.0, motion),
     "limits.slip": Row("path", False, margins),
     "limits.slip_share": Row("path", 0.1, motion),
+    "limits.slip_rule": Row("path", "load", motion),
     "limits.acceleration": Row("path", 0.3, motion),
     "limits.deceleration": Row("path", 0.3, motion),
     "limits.tip": Row("path", False, margins),

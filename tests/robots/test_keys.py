@@ -160,6 +160,7 @@ ROWS: dict[str, Row] = {
     ),
     "steering.rule": Row("car", "steering.0.rule", ("ackermann", "parallel"), "steering angles"),
     "steering.range": Row("car", "steering.0.range", ([-0.4, 0.4], [-0.3, 0.3]), "findings"),
+    "sharing": Row("loc8", "sharing", ("least_norm", "capacity"), "slip"),
     "skid.effective_track": Row("powerbot", "skid.effective_track", (0.5, 0.8), "rates", SKID),
 }
 

@@ -46,7 +46,7 @@ def powerbot_limits() -> Figures:
         found[f"a_tip (2.24) at {degrees:g} deg, m/s^2"] = float(thesis_tip_acceleration(thesis)[0])
         hill = RobotPath.through([[0, 0, 0], [3 * math.cos(slope), 0, 3 * math.sin(slope)]])
         samples = sample_path(hill, np.array([1.5]))
-        for limit in (Slip(FRICTION), Tip()):
+        for limit in (Slip(FRICTION, rule="load"), Tip()):
             rows = limit.rows(samples, robot)
             push, slow = rows.a > 1e-9, rows.a < -1e-9
             for what, value in (

@@ -46,7 +46,11 @@ def random_set(rng: np.random.Generator) -> list[Limit]:
         lambda: limit("acceleration", forward=size[2], braking=size[3]),
         lambda: limit("wheel_speed", largest=10 * size[4]),
         lambda: limit("wheel_acceleration", largest=10 * size[5]),
-        lambda: limit("slip", friction=min(size[6], 3.0), per_wheel=bool(rng.random() < 0.3)),
+        lambda: limit(
+            "slip",
+            friction=min(size[6], 3.0),
+            rule="capacity" if rng.random() < 0.3 else "least_norm",
+        ),
         lambda: limit("tip"),
         lambda: limit("speed_zones", zones=((0.1, 0.4, size[7]),)),
         lambda: limit(

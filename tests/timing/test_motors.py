@@ -166,15 +166,14 @@ def by_scalars(path: Path, one: Robot, power: float, cells: int) -> float:
 )
 def test_hills_and_bends_against_scalars(curve):
     """DC motors, and motors of constant power, with hills, bends and a bound on power. The error of
-    both halves with their cells: extrapolated."""
+    scalars halves with their cells: extrapolated."""
     one = robot("powerbot", {"motors.all.curve": curve, "motors.all.torque": 25.0})
     limits = [WheelTorque(), MotorCurve(), Power(150.0)]
-    coarse, found = (
-        time_scale(HILLS, limits, robot=one, gridpoints=graded(HILLS, count))
-        for count in (1000, 2000)
-    )
+    found = time_scale(HILLS, limits, robot=one, gridpoints=graded(HILLS, 2000))
     times = [by_scalars(HILLS, one, 150.0, cells) for cells in (1500, 3000)]
-    assert 2 * found.duration - coarse.duration == pytest.approx(2 * times[1] - times[0], rel=1e-4)
+    expected = 2 * times[1] - times[0]
+    assert found.duration == pytest.approx(expected, rel=1e-4)
+    assert found.bound < expected < found.duration
     assert min(found.margins().values()) > -1e-9
     assert {"motor_curve", "wheel_torque", "power"} >= set(found.binding) - {""} >= {"motor_curve"}
 
@@ -193,16 +192,6 @@ def test_margins_are_those_of_the_limit_itself():
     assert share > -1e-6
     used = motor_power(samples, one).at(sdd, v**2).sum(axis=1) * v
     assert found.margins()["power"] == pytest.approx(1 - used.max() / 90.0, abs=2e-3)
-
-
-@pytest.mark.parametrize("engine", ["compiled", "toppra"])
-def test_engines_agree(engine):
-    limits = [MotorCurve(), WheelTorque(), Power(120.0)]
-    times = [
-        time_scale(HILLS, limits, robot=dc(), gridpoints=400, engine=name).duration
-        for name in ("auto", engine)
-    ]
-    assert times[1] == pytest.approx(times[0], rel=1e-6)
 
 
 def test_a_slope_that_only_slow_motors_hold():
@@ -250,11 +239,23 @@ def test_ranking_counts_the_curve():
     limits = [MotorCurve(), Acceleration(100.0, BRAKES)]
     found = rough_duration(STRAIGHT, limits, robot=dc(), gridpoints=1000)
     exact = time_scale(STRAIGHT, limits, robot=dc(), gridpoints=1000).duration
-    assert found == pytest.approx(exact, rel=1e-6)
+    # The rough one keeps the curve at gridpoints only, where torque falls with the root of s.
+    assert found == pytest.approx(exact, rel=2e-3)
 
 
-@pytest.mark.parametrize("engine", ["linear", "segments"])
-def test_one_factor_on_time_is_refused(engine):
+def test_the_bound_of_motors_is_near_and_below():
+    """Chords in place of curves: no motion on finer grids is faster than the bound."""
+    one = robot("powerbot", {"motors.all.curve": [[0, 22], [2, 22], [4, 11], [8, 5.5], [25, 1]]})
+    limits = [WheelTorque(25.0), MotorCurve(), Power(150.0)]
+    coarse = time_scale(HILLS, limits, robot=one)
+    fine = time_scale(HILLS, limits, robot=one, gridpoints=4000, gap=None)
+    assert coarse.gap <= 1e-3
+    assert coarse.bound <= fine.duration * (1 + 5e-5)
+    assert fine.duration <= coarse.duration * (1 + 5e-5)
+
+
+@pytest.mark.parametrize("engine", ["linear", "segments", "toppra"])
+def test_engines_of_first_order_refuse_them(engine):
     with pytest.raises(ArgumentError, match="engine"):
         time_scale(STRAIGHT, [MotorCurve()], robot=dc(), engine=engine)
 

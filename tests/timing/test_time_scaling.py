@@ -107,7 +107,7 @@ def test_every_limit_on_every_path_keeps_its_margin(name, shape, engine):
         limits.append(limit("acceleration", name="push"))
     if name == "speed_zones":
         limits.append(limit("speed", name="cap", largest=3.0))
-    if engine == "linear" and not is_linear(limits[0]):
+    if engine in ("linear", "toppra") and not is_linear(limits[0]):
         with pytest.raises(ArgumentError, match=name):
             time_scale(PATHS[shape], limits, robot=robot, gridpoints=60, engine=engine)
         return

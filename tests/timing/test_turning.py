@@ -17,6 +17,7 @@ from trajopt.paths.path import Path
 from trajopt.robots import robot
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.track import track
+from trajopt.timing.trajectory import Trajectory
 
 PACE = [Speed(1.0), Acceleration(1.0, 1.0)]
 WAVE = Path.through([[0, 0], [2, 1], [4, 0]])
@@ -135,6 +136,12 @@ def test_the_support_of_asoc_moves_with_its_castors() -> None:
     np.testing.assert_allclose(arms[1], pivots - 0.1 * back + sides * left, atol=1e-9)
 
 
+def front_angles(found: Trajectory, time: np.ndarray) -> list[np.ndarray]:
+    """Steering angles of a car's front wheels, from its twist: towards the middle of its turn."""
+    twist, half = found.at(time).twist, CAR.description.wheels[0].position[1]
+    return [np.arctan(BASE * twist[:, 2] / (twist[:, 0] - y * twist[:, 2])) for y in (half, -half)]
+
+
 def test_a_steering_rate_that_binds_makes_a_car_slower_and_says_so() -> None:
     free = time_scale(BEND, PACE, robot=CAR)
     rate = time_scale(BEND, [*PACE, SteeringRate(0.04)], robot=CAR)
@@ -149,17 +156,26 @@ def test_a_steering_rate_that_binds_makes_a_car_slower_and_says_so() -> None:
     assert same.duration == pytest.approx(bent.duration, rel=1e-9)
     along = time_scale(BEND, [*PACE, SteeringAcceleration(0.03)], robot=CAR)
     time = np.linspace(0, along.duration, 3001)[1:-1]
-    middle = np.arctan(BASE * along.at(time).twist[:, 2] / along.at(time).twist[:, 0])
-    push = np.gradient(np.gradient(middle, time), time)
+    inner, outer = front_angles(along, time)
+    push = np.hstack([np.gradient(np.gradient(a, time), time)[:, None] for a in (inner, outer)])
     knots = along.times[np.searchsorted(along.u, BEND.basis.knots)]
     far = np.abs(time[:, None] - knots).min(axis=1) > 0.02
     assert push[far].max() == pytest.approx(0.03, rel=5e-3)
     assert push[far].min() == pytest.approx(-0.03, rel=5e-3)
     time = np.linspace(0, rate.duration, 3001)[1:-1]
-    # the group's angle is that of a wheel in the middle
-    middle = np.arctan(BASE * rate.at(time).twist[:, 2] / rate.at(time).twist[:, 0])
-    pace = np.gradient(middle, time)
-    assert np.abs(pace).max() == pytest.approx(0.04, rel=2e-3)
+    paces = [np.abs(np.gradient(angle, time)) for angle in front_angles(rate, time)]
+    assert np.max(paces) == pytest.approx(0.04, rel=2e-3)
+
+
+def test_the_inner_wheel_of_a_car_keeps_the_steering_rate() -> None:
+    """Deep in a bend it turns faster than the angle in the middle."""
+    found = time_scale(WAVE, [*PACE, SteeringRate(0.04)], robot=CAR)
+    time = np.linspace(0, found.duration, 6001)[1:-1]
+    paces = np.abs([np.gradient(angle, time) for angle in front_angles(found, time)])
+    twist = found.at(time).twist
+    middle = np.abs(np.gradient(np.arctan(BASE * twist[:, 2] / twist[:, 0]), time))
+    assert paces.max() == pytest.approx(0.04, rel=2e-3)
+    assert (paces.max(axis=0) - middle).max() > 5e-4
 
 
 def test_steering_takes_the_corners_of_curvature_within_a_milliradian() -> None:

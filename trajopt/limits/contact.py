@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from trajopt.errors import ArgumentError
-from trajopt.limits.forces import contact_loads
 from trajopt.limits.limit import Rows, linear_rows, require_robot
+from trajopt.limits.loads import contact_loads
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Body, Robot
 from trajopt.robots.steering import steering_of
@@ -66,8 +65,8 @@ def specific_force(path: PathSamples, body: Body) -> Affine:
     """
     r = np.asarray(body.cog, dtype=np.float64)
     w = path.turning
-    a = path.velocity + _cross(w, r)
-    b = path.acceleration_rate + _cross(path.turning_rate, r) + _cross(w, _cross(w, r))
+    a = path.velocity + cross(w, r)
+    b = path.acceleration_rate + cross(path.turning_rate, r) + cross(w, cross(w, r))
     return Affine(a, b, -STANDARD_GRAVITY * path.gravity)
 
 
@@ -76,7 +75,7 @@ def ground_moment(path: PathSamples, body: Body) -> Affine:
     m^2/s^2, body frame."""
     inertia = np.array([body.roll_inertia, body.pitch_inertia, body.yaw_inertia]) / body.mass
     w = path.turning
-    b = path.turning_rate * inertia + _cross(w, w * inertia)
+    b = path.turning_rate * inertia + cross(w, w * inertia)
     return Affine(w * inertia, b, np.zeros_like(w))
 
 
@@ -103,29 +102,13 @@ def contact_arms(path: PathSamples, robot: Robot) -> Array:
     return contact_points(path, robot) - np.asarray(robot.body.cog[:2], dtype=np.float64)
 
 
-def contact_loads(path: PathSamples, robot: Robot) -> Affine:
-    """(N, K): normal force on every contact, m/s^2 (times the mass: N).
-
-    Force along the normal, pitch and roll balance give three equations. Where more contacts share
-    the load, ground and suspension are equally stiff everywhere: the distribution of least norm.
-    Raises ArgumentError when the contacts lie on one line (they cannot hold the body up).
-    """
-    arms = contact_arms(path, robot)
-    balance = np.concatenate([np.ones((*arms.shape[:-1], 1)), arms], axis=-1)
-    if np.linalg.matrix_rank(balance[0] if balance.ndim == 3 else balance) < 3:
-        raise ArgumentError(
-            "robot.body.contacts", robot.body.contacts, "three or more contacts not on one line"
-        )
-    return load_demand(path, robot.body).through(least_norm(np.swapaxes(balance, -1, -2)))
-
-
 def least_norm(rows: Array) -> Array:
     """(..., K, R): pseudo-inverse of matrices (..., R, K) of full rank R <= K."""
     turned = np.swapaxes(rows, -1, -2)
     return np.asarray(np.swapaxes(np.linalg.solve(rows @ turned, rows), -1, -2))
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Cross product of vectors (N, 3), or of vectors and one (3,)."""
-    (ax, ay, az), (bx, by, bz) = a.T, b.T
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of vectors (..., 3)."""
+    (ax, ay, az), (bx, by, bz) = (np.moveaxis(v, -1, 0) for v in (a, b))
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)

@@ -28,9 +28,9 @@ def grade_by_torque(robot: Robot) -> float:
 
 
 def grade_by_friction(robot: Robot, friction: float) -> float:
-    """rad: by what wheels hold at rest with a friction coefficient. Raises ArgumentError as
-    ``Slip``."""
-    slip, still = Slip(friction), np.zeros(1)
+    """rad: by what all wheels together hold at rest with a friction coefficient. Raises
+    ArgumentError as ``Slip``."""
+    slip, still = Slip(friction, rule="capacity"), np.zeros(1)
     low, high = 0.0, np.pi / 2 - 1e-3
     for _ in range(_STEPS):
         middle = (low + high) / 2

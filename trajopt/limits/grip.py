@@ -97,6 +97,15 @@ def contact_forces(path: PathSamples, robot: Robot) -> Affine:
 
     Raises ArgumentError where they cannot push along x and y and turn the robot.
     """
+    return ground_wrench(path, robot).through(least_norm(wrench_of_forces(path, robot))[..., :3])
+
+
+def wrench_of_forces(path: PathSamples, robot: Robot) -> Array:
+    """(3 + P, F), or (N, 3 + P, F) where wheels turn: what a unit of every possible force gives
+    along x, y and about the centre of gravity, and about each of the P pivots that turn freely.
+
+    Raises ArgumentError where they cannot push along x and y and turn the robot.
+    """
     holds, steering = holds_of(robot), steering_of(robot)
     arms = contact_arms(path, robot)
     angle = steering.angle
@@ -117,4 +126,4 @@ def contact_forces(path: PathSamples, robot: Robot) -> Affine:
         raise ArgumentError(
             "robot.motors", robot.name, "driven wheels that can push along x and y and turn it"
         )
-    return ground_wrench(path, robot).through(least_norm(matrix)[..., :3])
+    return matrix

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from trajopt.arrays import Array, as_numbers
+from trajopt.arrays import Array, IndexArray, as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
@@ -37,7 +37,8 @@ class Limit(Protocol):
     """A limit of a motion. ``name`` is unique among the limits used together.
 
     One that is not linear in (s'', s'^2) has an attribute ``linear`` = False, and rows that are
-    exact at s'^2 = ``path.sd2`` and nowhere looser than the limit: see ``MotorCurve``.
+    exact at s'^2 = ``path.sd2`` and nowhere looser than the limit; ``a`` does not depend on ``sd2``:
+    see ``MotorCurve``. ``free_at_rest`` = True says that it leaves any force at rest, as ``Power``.
     """
 
     @property
@@ -122,6 +123,29 @@ def steered_wheels(
         raise ArgumentError("path", "samples without wheel states", "those of a Track: it steers")
     own = [getattr(group, key) for group in groups]
     return path.wheels, tuple(np.inf if value is None else value for value in own)
+
+
+@dataclass(frozen=True, eq=False)
+class Turns:
+    """Of M wheels that a [[steering]] turns, and of the angles of the G [[steering]] with several
+    wheels: derivatives (N, M + G), and the place (M + G,) of each among all [[steering]]."""
+
+    rate: Array  # rad/m
+    bend: Array  # rad/m^2
+    group: IndexArray
+
+
+def turns_of(wheels: WheelStates, robot: Robot) -> Turns:
+    """Of every wheel that is steered and of every [[steering]]."""
+    groups = steering_of(robot).groups
+    members = np.concatenate(groups)
+    return Turns(
+        np.hstack([wheels.steering_rate[:, members], wheels.group_rate]),
+        np.hstack([wheels.steering_bend[:, members], wheels.group_bend]),
+        np.concatenate(
+            [np.repeat(np.arange(len(groups)), [len(g) for g in groups]), np.arange(len(groups))]
+        ),
+    )
 
 
 def require_robot(name: str, robot: Robot | None) -> Robot:

@@ -28,6 +28,7 @@ class Power:
     largest: float  # W
     name: str = "power"
     linear: ClassVar[bool] = False
+    free_at_rest: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         require_positive(f"{self.name}.largest", self.largest, "W")

@@ -11,7 +11,9 @@ from trajopt.limits.limit import (
     by_wheel,
     linear_rows,
     require_each_positive,
+    require_robot,
     steered_wheels,
+    turns_of,
 )
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
@@ -24,9 +26,9 @@ class SteeringAcceleration:
     """|steering acceleration| <= ``largest``, rad/s^2, of every [[steering]] of the robot; one number, or one
     each (G,), inf where there is no limit; None: those of the robot's file.
 
-    The angle of several wheels steered together is that of a wheel in their middle. The
-    angle is a function of the path, so its acceleration is group_rate s'' + group_bend s'^2. Two
-    rows a steering.
+    It holds for every wheel that the [[steering]] turns, and for its angle, that of a wheel in their
+    middle. Angles are functions of the path: acceleration = rate s'' + bend s'^2, each per path. Two
+    rows a wheel and an angle.
 
     Where the rate itself jumps (a car's at the knots of a cubic spline, where curvature has a
     corner) steering takes the corner: with its acceleration a, evenly before and after, the angle
@@ -46,7 +48,9 @@ class SteeringAcceleration:
         wheels, own = steered_wheels(self.name, path, robot, "acceleration")
         asked = own if self.largest is None else self.largest
         least, shares = by_wheel(f"{self.name}.largest", asked, len(own))
-        a, b = wheels.group_rate * shares, wheels.group_bend * shares
+        turns = turns_of(wheels, require_robot(self.name, robot))
+        each = np.broadcast_to(shares, len(own))
+        a, b = turns.rate * each[turns.group], turns.bend * each[turns.group]
         a, b = np.hstack([a, -a]), np.hstack([b, -b])
         with np.errstate(divide="ignore"):
             corner = 8 * _CORNER * least / np.max(wheels.group_jump**2 * shares, axis=1)

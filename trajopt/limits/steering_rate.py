@@ -10,8 +10,10 @@ from trajopt.limits.limit import (
     Rows,
     by_wheel,
     require_each_positive,
+    require_robot,
     speed_rows,
     steered_wheels,
+    turns_of,
 )
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
@@ -22,8 +24,9 @@ class SteeringRate:
     """|steering rate| <= ``largest``, rad/s, of every [[steering]] of the robot; one number, or one
     each (G,), inf where there is no limit; None: those of the robot's file.
 
-    The angle of several wheels steered together is that of a wheel in their middle. The
-    angle is a function of the path, so its rate is group_rate s'.
+    It holds for every wheel that the [[steering]] turns, the inner one of a car included, and for
+    its angle, that of a wheel in their middle. Angles are functions of the path: rate = rate per
+    path x s'.
     Raises ArgumentError unless ``largest`` > 0, for a robot that does not steer or whose file gives
     no rate where none is asked for, or without a robot.
     """
@@ -39,4 +42,6 @@ class SteeringRate:
         wheels, own = steered_wheels(self.name, path, robot, "rate")
         asked = own if self.largest is None else self.largest
         least, shares = by_wheel(f"{self.name}.largest", asked, len(own))
-        return speed_rows(self.name, np.max(np.abs(wheels.group_rate) * shares, axis=1), least)
+        turns = turns_of(wheels, require_robot(self.name, robot))
+        each = np.broadcast_to(shares, len(own))[turns.group]
+        return speed_rows(self.name, np.max(np.abs(turns.rate) * each, axis=1), least)

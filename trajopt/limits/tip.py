@@ -8,8 +8,8 @@ import numpy as np
 
 from trajopt.arrays import Array, require_not_negative
 from trajopt.errors import ArgumentError
-from trajopt.limits.forces import contact_arms, load_demand
 from trajopt.limits.limit import Rows, linear_rows, require_robot
+from trajopt.limits.loads import supports
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 
@@ -22,12 +22,14 @@ class Tip:
     """No tipping fore, aft or sideways; ``reserve`` (m) keeps the zero-moment point that far
     inside.
 
-    The load on the far side of every edge of the support polygon (the convex hull of the contacts)
-    stays >= 0: n . (sum x N, sum y N) <= d sum N, with n the outward normal of the edge and d its
-    distance from the foot of the centre of gravity. On level ground that is -h n . (f_x, f_y) <= d
-    f_z, for two axles N_A >= 0, N_B >= 0 and h |f_y| <= w f_z. One row an edge, or a
-    contact where castors swivel; contact with the ground (f_z >= 0) follows from them. Raises
-    ArgumentError for a reserve < 0, a centre of gravity outside the support, or no robot.
+    The load on the far side of every edge of the support polygon (the convex hull of the contacts,
+    with the middle of an axle that tilts for its wheels: ``limits/loads.py``) stays >= 0: n . (sum
+    x N, sum y N) <= d sum N, with n the outward normal of the edge and d its distance from the foot
+    of the centre of gravity. On level ground that is -h n . (f_x, f_y) <= d f_z, for two axles N_A
+    >= 0, N_B >= 0 and h |f_y| <= w f_z; where an axle tilts, h counts from its height across it.
+    One row an edge, or a place of support where castors swivel; contact with the ground (f_z >= 0)
+    follows from them. Raises ArgumentError for a reserve < 0, a centre of gravity outside the
+    support, or no robot.
     """
 
     reserve: float = 0.0  # m
@@ -38,7 +40,7 @@ class Tip:
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         robot = require_robot(self.name, robot)
-        arms = contact_arms(path, robot)
+        arms, demand = supports(path, robot)
         normals, distances = support_edges(arms) if arms.ndim == 2 else moving_edges(arms)
         distances = distances - self.reserve
         if arms.ndim == 2 and np.any(distances <= 0):
@@ -49,7 +51,7 @@ class Tip:
             )
         over = np.concatenate([-distances[..., None], normals], axis=-1)
         over = over / np.maximum(distances, _SMALLEST)[..., None]
-        value = load_demand(path, robot.body).through(over)
+        value = demand.through(over)
         return linear_rows(self.name, value.a, value.b, -value.c, STANDARD_GRAVITY)
 
 

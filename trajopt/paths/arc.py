@@ -11,6 +11,7 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.kernels import kernel
+from trajopt.paths.find import cell_at, longer, longer_indices
 
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(8)
 _DEEPEST = 60  # halvings of a cell: down to rounding
@@ -61,8 +62,7 @@ def measure(knots: Array, cubics: Array, settled: float) -> tuple[Array, Array, 
             fine = abs(first + second - whole) <= tolerance
             if fine or waiting > _DEEPEST or not left < middle < right:
                 if count + 2 > size:
-                    u, s = np.concatenate((u, u)), np.concatenate((s, s))
-                    segment = np.concatenate((segment, segment))
+                    u, s, segment = longer(u), longer(s), longer_indices(segment)
                     size = len(u)
                 for k in range(2):
                     u[count] = knots[i] + (middle if k else left)
@@ -79,7 +79,7 @@ def measure(knots: Array, cubics: Array, settled: float) -> tuple[Array, Array, 
                 wholes[waiting - 1] = second
                 ends[waiting], wholes[waiting] = middle, first
                 waiting += 1
-    return u[:count].copy(), s[: count + 1].copy(), segment[:count].copy()
+    return u[:count], s[: count + 1], segment[:count]
 
 
 @kernel(nogil=True)
@@ -88,9 +88,9 @@ def parameters(
 ) -> Array:
     """(N,): path parameters at spline parameters (N,), from the cells of ``measure``."""
     found = np.empty(len(u))
-    at = np.searchsorted(cells, u, side="right") - 1
+    i = 0
     for k in range(len(u)):
-        i = min(max(at[k], 0), len(cells) - 1)
+        i = cell_at(cells, len(cells), u[k], i)
         j = segment[i]
         found[k] = s[i] + gained(cubics[j], cells[i] - knots[j], u[k] - knots[j])
     return found
@@ -102,9 +102,9 @@ def places(
 ) -> Array:
     """(N,): spline parameters at path parameters (N,): inverse cubic, then Newton in brackets."""
     found = np.empty(len(wanted))
-    at = np.searchsorted(s, wanted, side="right") - 1
+    i = 0
     for k in range(len(wanted)):
-        i = min(max(at[k], 0), len(cells) - 1)
+        i = cell_at(s, len(cells), wanted[k], i)
         j = segment[i]
         left = cells[i] - knots[j]
         last = i + 1 >= len(cells) or segment[i + 1] != j

@@ -26,6 +26,7 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.wheel_torque import WheelTorque
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.problem.ground import scaled
+from trajopt.robots.description import Sharing
 from trajopt.robots.robot import Robot
 from trajopt.schema import NonNegative, OneOrEach, Positive, Section, Share, broken_rule
 
@@ -68,6 +69,11 @@ class LimitsSection(Section):
     slip_share: Share | None = Field(
         None, description="use only this share of the friction, with slip; absent: all of it"
     )
+    slip_rule: Sharing | None = Field(
+        None,
+        description="how wheels share the force, with slip: least_norm, capacity or load; absent: as "
+        "the robot's file says",
+    )
     acceleration: Positive | None = Field(None, description="along the motion, m/s^2")
     deceleration: Positive | None = Field(
         None, description="braking along the motion, m/s^2, positive"
@@ -93,6 +99,8 @@ class LimitsSection(Section):
             )
         if self.slip_share is not None and not self.slip:
             raise broken_rule("slip_share", self.slip_share, "slip = true with it")
+        if self.slip_rule is not None and (not self.slip or self.variant is not None):
+            raise broken_rule("slip_rule", self.slip_rule, "slip = true with it, and no variant")
         if self.variant is not None and not (self.slip or self.tip):
             raise broken_rule("variant", self.variant, "slip or tip, whose formulas it changes")
         return self
@@ -124,7 +132,7 @@ class LimitsSection(Section):
             zones = tuple((zone.start, zone.end, zone.speed) for zone in self.speed_zones)
             found.append(SpeedZones(zones))
         if self.slip and self.variant is None:
-            found.append(Slip(scaled(friction, self.share)))
+            found.append(Slip(scaled(friction, self.share), rule=self.slip_rule))
         if self.acceleration is not None and self.deceleration is not None:
             found.append(Acceleration(self.acceleration, self.deceleration))
         if self.tip and self.variant is None:

@@ -18,6 +18,7 @@ from trajopt.schema import NonNegative, Point, Point3, Positive, Section, Share,
 
 Kind = Literal["fixed", "steered", "castor", "swedish", "spherical"]
 Shape = Literal["spheres", "barrel", "ellipsoid", "cylinder", "cone"]
+Sharing = Literal["least_norm", "capacity", "load"]  # see limits/slip.py
 LARGEST_ROLLER_ANGLE = math.radians(80.0)  # rad, chosen: beyond, a wheel hardly drives
 
 
@@ -207,8 +208,12 @@ class SteeringSection(Section):
         description="of several wheels: ackermann, each at the angle that its own place needs; "
         "parallel, all at the angle that the place in their middle needs",
     )
-    rate: Positive | None = Field(None, description="largest, rad/s; absent: no limit")
-    acceleration: Positive | None = Field(None, description="largest, rad/s^2; absent: no limit")
+    rate: Positive | None = Field(
+        None, description="largest, of each of its wheels, rad/s; absent: no limit"
+    )
+    acceleration: Positive | None = Field(
+        None, description="largest, of each of its wheels, rad/s^2; absent: no limit"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -234,6 +239,12 @@ class RobotDescription(Section):
     motors: tuple[MotorSection, ...] = ()
     steering: tuple[SteeringSection, ...] = ()
     skid: SkidSection | None = None
+    sharing: Sharing = Field(
+        "least_norm",
+        description="of the ground's force by the wheels that hold, for the limit slip: least_norm, "
+        "each its part of the smallest forces; capacity, all that they hold together; load, as they "
+        "are loaded, without the yaw moment",
+    )
     source: str = Field("<robot>", exclude=True, repr=False)
 
     @model_validator(mode="after")
@@ -260,6 +271,9 @@ class RobotDescription(Section):
             if len({by_name[w].position for w in pivot.wheels}) > 1:
                 expected = "wheels whose position is the same pivot"
                 raise broken_rule("pivots.wheels", list(pivot.wheels), expected)
+            sides = [by_name[w].lateral for w in pivot.wheels]
+            if pivot.tilt == "passive" and not min(sides) < 0 < max(sides):
+                raise broken_rule("pivots.tilt", pivot.tilt, "wheels on either side of the pivot")
         if self.skid is not None and set(kinds.values()) != {"fixed"}:
             raise broken_rule("skid", "given", "skid steering only with fixed wheels")
         parts = sum(w.mass for w in self.wheels) + sum(p.mass for p in self.pivots)

@@ -15,6 +15,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
+from trajopt.limits.motor_curve import at_wheel
 from trajopt.robots.description import PivotSection, WheelSection
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 from trajopt.simulate.double import double_rollers
@@ -93,7 +94,7 @@ class _Parts:
         self.robot, self.discs = robot.description, discs
         self.links = [Link("chassis", -1, Joint("fixed", Pose()), 0.0, (0.0, 0.0, 0.0))]
         self.feet: dict[str, int] = {}
-        self.torque = {name: m.torque for m in self.robot.motors for name in m.wheels}
+        self.motor = {name: m for m in self.robot.motors for name in m.wheels}
         self.reach = {name: s.range for s in self.robot.steering for name in s.wheels}
         self.load = self.robot.body.mass * STANDARD_GRAVITY / len(self.robot.wheels)  # N a wheel
 
@@ -103,9 +104,13 @@ class _Parts:
 
     def spin(self, wheel: WheelSection, pose: Pose) -> Joint:
         """What turns a wheel: its motor, or nothing."""
-        torque = self.torque.get(wheel.name)
-        drive = None if torque is None else "velocity"
-        return Joint("spin", pose, (0.0, 1.0, 0.0), drive, math.inf if torque is None else torque)  # type: ignore[arg-type]
+        motor = self.motor.get(wheel.name)
+        if motor is None:
+            return Joint("spin", pose, (0.0, 1.0, 0.0))
+        return Joint(
+            "spin", pose, (0.0, 1.0, 0.0), "velocity", motor.torque,
+            curve=at_wheel(motor), brakes=motor.braking == "curve",
+        )  # fmt: skip
 
     def add_wheel(self, wheel: WheelSection) -> None:
         at = Pose((*wheel.position, wheel.radius), yaw=wheel.angle)

@@ -138,7 +138,9 @@ class Joint:
     Roles: "spin" of a wheel, "steer", "swivel" of a castor, "roller", "spring" (a vertical slide),
     "tilt" of an axle, "fixed". ``drive``: a servo of speed or of position, or a spring towards
     ``rest`` (spring) or a commanded angle (tilt), of ``stiffness`` (N/m, N m/rad); at most
-    ``effort`` (N, N m). ``damping`` N s/m or N m s/rad. ``reach``: from, to (m, rad).
+    ``effort`` (N, N m). ``damping`` N s/m or N m s/rad. ``reach``: from, to (m, rad). ``curve``: of a
+    wheel's motor, speed (rad/s) and the most torque there (N m) where it drives, and where it
+    ``brakes`` too.
     """
 
     role: Role
@@ -150,6 +152,8 @@ class Joint:
     rest: float = 0.0
     damping: float = 0.0
     reach: tuple[float, float] | None = None
+    curve: tuple[tuple[float, float], ...] = ()
+    brakes: bool = False
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from trajopt.errors import ArgumentError, MissingDependencyError, SimulationErro
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
 from trajopt.simulate.mjspec import STEERING_RATE, SpecBuilder
 from trajopt.simulate.model import Model, cross, quaternion_of
+from trajopt.simulate.motors import Motors
 from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
@@ -27,6 +28,10 @@ _NO_GRAPHICS: list[str] = []
 # Impedances of soft contacts, which act like mass the more the closer they are to 1; chosen: at 0.5 a
 # tall robot on tyres rocks until it falls over, at 0.9 rollers come down so hard that loads scatter
 TYRE_IMPEDANCE, ROLLER_IMPEDANCE = 0.9, 0.5
+# s, time constant of friction of soft rollers; chosen: sliding at v, MuJoCo lifts a soft contact by
+# about friction v / time over its stiffness, and the wheels of a rim that slides would take over load
+# from those that do not (at 4 ms a sixth of it, and a Mecanum robot planned beyond its grip held)
+ROLLER_FRICTION_TIME = 0.05
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -116,6 +121,8 @@ class _Session:
         self.before: Array | None = None
         self.motors = [s for s, driven in zip(model.spins, model.driven, strict=True) if driven]
         self.rotors = [int(compiled.joint(f"rotor_link_{s}").dofadr[0]) for s in self.motors]
+        self.tendons = [int(compiled.tendon(f"motor_link_{s}").id) for s in self.motors]
+        self.torques = Motors(model)
         # of every geom: the robot's link, the stage's solid; -1 for none
         owner = {b: i for i, b in enumerate(body)}
         self.link_of = np.array([owner.get(int(b), -1) for b in compiled.geom_bodyid])
@@ -143,6 +150,8 @@ class _Session:
             weight = (1.0 - d) * compiled.body_invweight0[compiled.geom_bodyid[geom], 0]
             compiled.pair_solref[pair] = [-soft[0] * weight, -soft[1] * weight]
             compiled.pair_solimp[pair] = [d, d, 0.001, 0.5, 2.0]
+            if link.joint.role == "roller":
+                compiled.pair_solreffriction[pair] = [ROLLER_FRICTION_TIME, 1.0]
             if compiled.geom_type[geom] == self.mujoco.mjtGeom.mjGEOM_SPHERE:
                 compiled.geom_size[geom, 0] += TYRE_SAG / 2.0
                 compiled.geom_rbound[geom] += TYRE_SAG / 2.0
@@ -164,6 +173,11 @@ class _Session:
             self.data.mocap_pos[self.mocap] = self.plates.place
             self.data.mocap_quat[self.mocap] = self.plates.quaternions()
         self.data.qvel[self.rotors] = wheel_speeds[self.driven]
+        if self.torques.curves:
+            speeds = self.data.qvel[[self.rate[i] for i in self.motors]]
+            self.compiled.tendon_frictionloss[self.tendons] = self.torques.most(
+                speeds, wheel_speeds[self.driven]
+            )
         self.data.ctrl[:] = self._leading(angles)
         self.mujoco.mj_step(self.compiled, self.data)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.limits.forces import contact_loads
+from trajopt.limits.loads import contact_loads
 from trajopt.simulate.engine import Command
 from trajopt.simulate.model import Model
 from trajopt.simulate.scene import Area

@@ -32,6 +32,7 @@ from trajopt.simulate.bullet import (
 from trajopt.simulate.bullet_grip import Grip
 from trajopt.simulate.engine import Camera, Contacts, Motion, Start
 from trajopt.simulate.model import Model, cross
+from trajopt.simulate.motors import Motors
 from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
@@ -180,7 +181,7 @@ class _Session:
         links = model.links
         spins = [s for s, driven in zip(model.spins, model.driven, strict=True) if driven]
         self.driven = np.array(model.driven, dtype=bool)
-        self.spins, self.efforts = self._joints(spins), [links[s].joint.effort for s in spins]
+        self.turned, self.spins, self.motors = tuple(spins), self._joints(spins), Motors(model)
         steered = [t for t in model.targets if links[t].joint.drive == "position"]
         self.steered, self.powers = self._joints(steered), [links[s].joint.effort for s in steered]
         # Bullet's own jointDamping does nothing to them (measured)
@@ -232,9 +233,10 @@ class _Session:
         """See ``engine.Session``."""
         bullet, robot = self.bullet, self.robot
         if self.spins:
+            asked, speeds = wheel_speeds[self.driven], self.joints(self.turned)[1]
             bullet.setJointMotorControlArray(
                 robot, self.spins, bullet.VELOCITY_CONTROL,
-                targetVelocities=wheel_speeds[self.driven].tolist(), forces=self.efforts,
+                targetVelocities=asked.tolist(), forces=self.motors.most(speeds, asked).tolist(),
                 velocityGains=[self.options.wheel_gain] * len(self.spins),
             )  # fmt: skip
         count = len(self.steered)

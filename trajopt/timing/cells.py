@@ -154,6 +154,11 @@ class Cells:
         return np.flatnonzero(kept)
 
     @cached_property
+    def spare(self) -> Array:
+        """(P, R): room for tightened bounds of rows."""
+        return np.empty_like(self.table.c)
+
+    @cached_property
     def cap(self) -> Array:
         """(P,): the least bound on sigma'^2."""
         return np.asarray(np.minimum(self.table.bounds.min(axis=0), SD2_CAP))

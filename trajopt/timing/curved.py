@@ -43,15 +43,15 @@ class Curved:
         a, b, c, scale, bounds, owner = self._rows(track, measure, spots, None)
         whole = np.empty((len(self.limits), len(spots.u)))
         whole[self.bent] = bounds
-        parts, owners = [(a / scale, b / scale, c / scale)], [self.bent[owner]]
-        if self.steady is not None:
-            steady = self.steady.table(track, measure, spots)
-            whole[self.straight] = steady.bounds
-            parts.insert(0, (steady.a, steady.b, steady.c))
-            owners.insert(0, self.straight[steady.owner])
-        joined = (np.hstack(columns) for columns in zip(*parts, strict=True))
         names = tuple(limit.name for limit in self.limits)
-        return Table(*joined, whole, names, np.concatenate(owners), ())
+        rows, mine = (a / scale, b / scale, c / scale), self.bent[owner]
+        if self.steady is None:
+            return Table(*rows, whole, names, mine, ())
+        steady = self.steady.table(track, measure, spots)
+        whole[self.straight] = steady.bounds
+        owners = np.concatenate([self.straight[steady.owner], mine])
+        known = Table(steady.a, steady.b, steady.c, whole, names, owners, ())
+        return _beside(known, steady.a.shape[1], *rows)
 
     def tangent(
         self, track: Track, measure: Measure, spots: Spots, table: Table, y: Array
@@ -106,12 +106,20 @@ class Curved:
 
 def _with(table: Table, a: Array, b: Array, c: Array) -> Table:
     """``table`` with other last columns."""
-    first = table.a.shape[1] - a.shape[1]
-    joined = (
-        np.hstack([old[:, :first], new])
-        for old, new in zip((table.a, table.b, table.c), (a, b, c), strict=True)
+    return _beside(table, table.a.shape[1] - a.shape[1], a, b, c)
+
+
+def _beside(table: Table, first: int, a: Array, b: Array, c: Array) -> Table:
+    """``table`` with the columns a, b, c after its ``first`` ones."""
+    return Table(
+        np.hstack([table.a[:, :first], a]),
+        np.hstack([table.b[:, :first], b]),
+        np.hstack([table.c[:, :first], c]),
+        table.bounds,
+        table.names,
+        table.owner,
+        table.edges,
     )
-    return Table(*joined, table.bounds, table.names, table.owner, table.edges)
 
 
 def source_of(track: Track, measure: Measure, limits: Sequence[Limit]) -> Source:

@@ -26,6 +26,11 @@ OTHERS = (
 )  # names that choose one of the above, or another way to scale
 
 
+def is_second_order(name: str) -> bool:
+    """Whether it is the core, in which s'' is linear between gridpoints."""
+    return name in ("auto", "compiled")
+
+
 def pick_engine(name: str, stages: Stages) -> str:
     """The engine that ``name`` means for these rows: the fastest that is exact for "auto" and
     "segments"."""

@@ -29,6 +29,10 @@ _LEFT = 2e-5  # excess after the first rounds for which further ones are not spe
 _KEPT = 1e-9  # relative violation that counts as none
 _TIGHTER = (0.0, 1e-4, 1e-3)  # off all rows, in turn, where slowing down does not help; chosen
 LARGEST_SLOWDOWN = 1.001  # of time; chosen
+_FALLS = (
+    0.8  # of the gap that two refinements have to leave at most, or no further one is made; chosen
+)
+_SLOWED = 1 + 1e-4  # of time, that is not refined away where no gap is asked for; chosen
 _MOST_CELLS = 40_000  # chosen
 _REFINEMENTS = 8  # of the grid; chosen
 _SAME = 1e-9  # relative difference of speeds that counts as equal
@@ -73,6 +77,16 @@ class Found:
     bound: float | None
     reason: str = ""  # why the gap is larger than was asked for
 
+    @property
+    def seconds(self) -> float:
+        """Duration, s."""
+        return float(self.profile.seconds.sum())
+
+    @property
+    def gap(self) -> float:
+        """How far the duration is from the bound at most, as a share of it."""
+        return 1 - (self.bound or 0.0) / self.seconds
+
 
 @dataclass(frozen=True, eq=False)
 class _Solved:
@@ -88,32 +102,36 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
     InfeasibleError."""
     measure = Measure.of(ask.track)
     best: Found | None = None
+    gaps: list[float] = []
     for done in range(_REFINEMENTS + 1):
         loose = cells_of(ask.track, measure, u, source, jumps)
-        cells = _settled(ask, loose, source)
-        solved, worst, over = _kept(ask, cells)
-        split = over
+        try:
+            cells = _settled(ask, loose, source)
+            solved, worst, split = _kept(ask, cells)
+        except Stuck:
+            if best is None:
+                raise
+            break
         if worst <= LARGEST_SLOWDOWN**2:
-            slow = float(np.sqrt(worst))
-            profile = Profile(measure, u, cells.d, solved.y, solved.first, solved.last).slower(slow)
-            if not np.isfinite(profile.seconds).all():
-                raise _standing(cells, profile.seconds)
-            found = Found(cells, profile, slow, None)
+            found, lost = _found(ask, source, loose, (cells, solved, worst))
+            if best is None or found.seconds < best.seconds:
+                best = found
+            gaps.append(best.gap)
             if ask.gap is None:
-                return found
-            bound, seconds = _bound(ask, loose, source, profile)
-            best = replace(found, bound=bound)
-            total = float(profile.seconds.sum())
-            if total - bound <= ask.gap * total:
+                if best.slowdown <= _SLOWED:
+                    return best
+            elif gaps[-1] <= ask.gap:
                 return best
-            lost = profile.seconds - seconds
-            split = lost > 0.25 * ask.gap * total / len(cells.d)
-            split |= over if slow > 1 + ask.gap / 10 else False
+            elif len(gaps) > 2 and gaps[-1] > _FALLS * gaps[-3]:
+                break
+            else:
+                many = lost > 0.25 * ask.gap * found.seconds / len(cells.d)
+                split = many | split if found.slowdown > 1 + ask.gap / 10 else many
         if done == _REFINEMENTS or len(u) > _MOST_CELLS or not split.any():
             break
         u = np.sort(np.concatenate([u, ((u[:-1] + u[1:]) / 2)[split]]))
     if best is not None:
-        return replace(best, reason=_reason(best, solved, len(u)))
+        return replace(best, reason="" if ask.gap is None else _reason(best, solved, len(u)))
     at = int(np.argmax(solved.over))
     limit, place = broken(cells, solved, at)
     raise InfeasibleError(
@@ -122,6 +140,34 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
         "it is broken between gridpoints, however fine the grid: "
         "it jumps here, or falls to zero too fast to be followed",
     )
+
+
+def _found(
+    ask: Ask, source: Source, loose: Cells, solution: tuple[Cells, _Solved, float]
+) -> tuple[Found, Array]:
+    """The motion slowed as it must be, with its bound where one is wanted, and (N,) the time that
+    each cell may lose against that, s. Raises InfeasibleError where it stands."""
+    cells, solved, worst = solution
+    slow = float(np.sqrt(worst))
+    motion = solved.y, solved.first, solved.last
+    profile = Profile(Measure.of(ask.track), cells.u, cells.d, *motion).slower(slow)
+    if not np.isfinite(profile.seconds).all():
+        raise _standing(cells, profile.seconds)
+    found = Found(cells, profile, slow, None)
+    if ask.gap is None:
+        return found, np.zeros(len(cells.d))
+    bound, least = _bound(ask, loose, source, profile)
+    return replace(found, bound=bound), profile.seconds - least
+
+
+def roughly(ask: Ask, source: Source, u: Array, jumps: Array) -> float:
+    """Duration (s) of the fastest profile that keeps the rows at gridpoints u (N+1,). Raises
+    Stuck."""
+    from trajopt.timing import reach
+
+    cells = _settled(ask, cells_of(ask.track, Measure.of(ask.track), u, source, jumps), source)
+    profile = _pass(ask, cells, np.zeros(len(cells.places)), _from_rest(ask, cells))
+    return float(reach.cell_times(cells.d, *profile).sum())
 
 
 def _reason(best: Found, solved: _Solved, gridpoints: int) -> str:
@@ -156,7 +202,7 @@ def _kept(ask: Ask, cells: Cells) -> tuple[_Solved, float, BoolArray]:
 def _solve(ask: Ask, cells: Cells, tighter: float) -> _Solved:
     """Solved and re-solved with what the check between the gridpoints found."""
     tight = np.full(len(cells.places), tighter)
-    constant = np.zeros(len(cells.d), dtype=np.bool_)
+    constant = _from_rest(ask, cells)
     best: _Solved | None = None
     for done in range(_ROUNDS):
         try:
@@ -191,7 +237,9 @@ def _pass(ask: Ask, cells: Cells, tight: Array, constant: BoolArray) -> tuple[Ar
     from trajopt.timing import reach
 
     count, right = len(cells.d), cells.right
-    c = cells.table.c - tight[:, None] if tight.any() else cells.table.c
+    c = cells.table.c
+    if tight.any():
+        c = np.subtract(c, tight[:, None], out=cells.spare)
     rows = cells.table.a, cells.table.b, c
     top, bottom, rests = _ceilings(cells, c, cells.cap * (1 - tight))
     node = _nodes(ask, cells, top)
@@ -246,7 +294,7 @@ def _settled(ask: Ask, loose: Cells, source: Source) -> Cells:
     with rows at rest. Raises Stuck."""
     if not isinstance(source, Curved):
         return loose
-    none, straight = np.zeros(len(loose.places)), np.zeros(len(loose.d), dtype=np.bool_)
+    none, straight = np.zeros(len(loose.places)), _from_rest(ask, loose)
 
     def tangent(y: Array) -> Cells:
         where = ask.track, Measure.of(ask.track), loose.spots, loose.table
@@ -287,6 +335,19 @@ def _settled(ask: Ask, loose: Cells, source: Source) -> Cells:
         if found and _near(y, before, _SETTLED):
             break
     return tangent(y)
+
+
+def _from_rest(ask: Ask, cells: Cells) -> BoolArray:
+    """(N,): cells that take constant u from the first: next to rest where a limit (power) leaves any
+    force there."""
+    found = np.zeros(len(cells.d), dtype=np.bool_)
+    if not any(getattr(limit, "free_at_rest", False) for limit in ask.limits):
+        return found
+    found[0], found[-1] = ask.start == 0, ask.end == 0
+    for place in ask.stops:
+        at = int(np.argmin(np.abs(cells.u - place)))
+        found[max(at - 1, 0) : at + 1] = True
+    return found
 
 
 def _near(new: Array, old: Array, share: float) -> bool:

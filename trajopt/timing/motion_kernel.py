@@ -10,6 +10,7 @@ import numpy as np
 
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.kernels import kernel
+from trajopt.paths.find import cell_at
 from trajopt.timing.spread import pace
 
 _POINTS = 5
@@ -26,9 +27,9 @@ def sigma_powers(
     """(N, 5): coefficients of t, .. t^5 of sigma / d in every cell of the grid u (N+1,), t from 0 to
     1; and where they fit."""
     powers, fits = np.zeros((len(d), _POINTS)), np.zeros(len(d), dtype=np.bool_)
-    segments = np.searchsorted(knots, u, side="right") - 1
+    i = 0
     for k in range(len(d)):
-        i = min(max(segments[k], 0), len(cubics) - 1)
+        i = cell_at(knots, len(cubics), u[k], i)
         h = u[k + 1] - u[k]
         if d[k] <= 0 or h <= 0:
             continue
@@ -50,18 +51,6 @@ def sigma_powers(
         fits[k] = abs(middle - half) <= _FITS and abs(whole - 1) <= _FITS
         fits[k] = fits[k] and powers[k, 0] > 0.4 and last > 0.4
     return powers, fits
-
-
-@kernel(nogil=True)
-def _found(sorted_values: Array, value: float, last: int) -> int:
-    """The cell of a value, looked for from the cell ``last`` on."""
-    count = len(sorted_values) - 1
-    if sorted_values[last] <= value:
-        if last + 1 >= count or value < sorted_values[last + 1]:
-            return last
-        if last + 2 >= count or value < sorted_values[last + 2]:
-            return last + 1
-    return min(max(int(np.searchsorted(sorted_values, value, side="right")) - 1, 0), count - 1)
 
 
 @kernel(nogil=True)
@@ -100,11 +89,12 @@ def places(
     """Fills spline parameters and sigma' (M,) at times (M,); ``starts`` (N+1,) are those of cells.
     Returns the cells of times where the polynomial does not fit, else -1; there ``found`` holds sigma
     gained."""
-    left = np.full(len(times), -1)
+    left = np.empty(len(times), dtype=np.intp)
     i = 0
     for k in range(len(times)):
-        i = _found(starts, times[k], i)
+        i = cell_at(starts, len(d), times[k], i)
         after = min(max(times[k] - starts[i], 0.0), starts[i + 1] - starts[i])
+        left[k] = -1
         gained, speed[k] = _moment(d[i], y[i], first[i], last[i], after)
         if not fits[i]:
             found[k], left[k] = gained, i
@@ -144,7 +134,7 @@ def bodies(
     path's."""
     i = n = 0
     for k in range(len(u)):
-        i = _found(knots, u[k], i)
+        i = cell_at(knots, len(cubics), u[k], i)
         f, t = cubics[i], u[k] - knots[i]
         x1 = f[1, 0] + t * (2 * f[2, 0] + t * 3 * f[3, 0])
         y1 = f[1, 1] + t * (2 * f[2, 1] + t * 3 * f[3, 1])
@@ -165,7 +155,7 @@ def bodies(
             if bent:
                 turn = length * w
                 rate = rate / np.sqrt(1 + turn * turn)
-            n = _found(turns, u[k], n)
+            n = cell_at(turns, len(turns) - 1, u[k], n)
             yaw = np.arctan2(y1, x1)
             yaw += 2 * np.pi * np.round((yaws[n] - yaw) / (2 * np.pi))
         pose[k, 0] = position[k, 0] = f[0, 0] + t * (f[1, 0] + t * (f[2, 0] + t * f[3, 0]))
@@ -196,7 +186,7 @@ def wheels(
     count, i = inverse.shape[0], 0
     s = np.empty(len(u))
     for k in range(len(u)):
-        i = _found(table, u[k], i)
+        i = cell_at(table, len(table) - 1, u[k], i)
         t = (u[k] - table[i]) / (table[i + 1] - table[i])
         for q in range(count + 1):
             c1, c2, c3, c4, c5 = powers[i, q]
@@ -231,7 +221,7 @@ def castors(
     parameters (M,), from polynomials (6, N, C) in cells (N+1,) of ``Turning``."""
     i = 0
     for k in range(len(s)):
-        i = _found(cells, s[k], i)
+        i = cell_at(cells, len(cells) - 1, s[k], i)
         t = (s[k] - cells[i]) / (cells[i + 1] - cells[i])
         vx, vy, w, rate = unit[k]
         for c in range(len(members)):

@@ -25,20 +25,20 @@ from trajopt.arrays import Array, IndexArray
 from trajopt.errors import TrajoptError
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.contact import Contact
-from trajopt.limits.grip import holds_of
 from trajopt.limits.limit import Limit, spins
-from trajopt.limits.slip import Slip, _normals
+from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.wheel_torque import WheelTorque
 from trajopt.limits.yaw_rate import YawRate
-from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 from trajopt.robots.start import start_angles
 from trajopt.robots.steering import steering_of
 from trajopt.timing.cells import Measure, Spots, Table
+from trajopt.timing.made_up import made_up, samples_of_twists
+from trajopt.timing.planar_slip import pushes, rigid
 from trajopt.timing.stages import assemble
 from trajopt.timing.track import Track
 
@@ -97,7 +97,8 @@ class Planar:
         from trajopt.timing import planar_kernel as kernels
 
         shape = (len(at), sum(block.rows for block in self.blocks))
-        a, b, c = np.empty(shape), np.empty(shape), np.empty(shape)
+        # One block: the allocator keeps it for the next call, several of its size it gives back.
+        a, b, c = np.empty((3, *shape))
         first, columns, matrices = 0, list[IndexArray](), list[Block]()
         for limit, block in zip(self.limits, self.blocks, strict=True):
             if block.moving:
@@ -105,11 +106,12 @@ class Planar:
                 assert arms is not None
                 cog, g = np.asarray(self.robot.body.cog), STANDARD_GRAVITY
                 if isinstance(limit, Slip):
-                    grips, mean = _grips(limit, self.robot)
-                    inside, normals = np.cos(np.pi / limit.sides), _normals(limit.sides)
-                    kernels.slip_rows(
-                        at, arms, cog, grips, g, normals, inside, mean * g, first, a, b, c
-                    )
+                    inside, start = np.cos(np.pi / limit.sides), first
+                    for push, grips, size in pushes(limit, self.robot):
+                        kernels.slip_rows(
+                            at, arms, cog, grips, g, push, inside, size * g, start, a, b, c
+                        )
+                        start += len(push)
                 elif isinstance(limit, Tip):
                     kernels.tip_rows(at, arms, cog, limit.reserve, _SMALLEST, first, a, b, c, g)
             elif len(block.a):
@@ -231,9 +233,10 @@ def _block(limit: Limit, robot: Robot | None, castors: bool) -> Block | None:
         assert robot is not None
         if isinstance(limit, (Contact, WheelTorque)):
             return None
-        if isinstance(limit, Slip) and (limit.per_wheel or not holds_of(robot).all_drive):
+        if isinstance(limit, Slip) and not rigid(limit, robot):
             return None
-        count = limit.sides if isinstance(limit, Slip) else len(robot.body.contacts)
+        slips = sum(len(part[0]) for part in pushes(limit, robot)) if isinstance(limit, Slip) else 0
+        count = slips or len(robot.body.contacts)
         return Block(none, np.zeros((0, 7)), np.zeros(0), none, count)
     samples, features = made_up(_PLACES)
     rows = limit.rows(samples, robot)
@@ -262,7 +265,7 @@ def _speeds(limit: Limit, robot: Robot | None) -> Array | None:
     elif type(limit) is YawRate:
         speeds = np.array([[0.0, 0.0, 1 / limit.largest, 0.0]])
     elif type(limit) is WheelSpeed and robot is not None:
-        unit = _samples(np.eye(3), np.zeros((3, 3)))
+        unit = samples_of_twists(np.eye(3), np.zeros((3, 3)))
         spin, _ = spins(unit, robot)
         largest = np.broadcast_to(np.asarray(limit.largest, dtype=np.float64), spin.shape[1:])
         speeds = np.column_stack([(spin / largest).T, np.zeros(len(largest))])
@@ -272,46 +275,3 @@ def _speeds(limit: Limit, robot: Robot | None) -> Array | None:
     rows = limit.rows(samples, robot)
     ours = 1 / np.max(np.abs(features[:, :4] @ speeds.T), axis=1) ** 2
     return speeds if np.allclose(ours, rows.sd2_max, rtol=_AGREE) else None
-
-
-def made_up(count: int) -> tuple[PathSamples, Array]:
-    """Samples at places that no path joins, and their features (N, 11)."""
-    rng = np.random.default_rng(20)
-    twist, rate = rng.uniform(-1, 1, (2, count, 3))
-    samples = _samples(twist, rate)
-    p = np.hypot(twist[:, 0], twist[:, 1])
-    p1 = np.sum(twist[:, :2] * rate[:, :2], axis=1) / p
-    w = twist[:, 2:]
-    return samples, np.column_stack([twist, p, rate, p1, w * w, w * twist[:, :2]])
-
-
-def _samples(twist: Array, rate: Array) -> PathSamples:
-    count, w = len(twist), twist[:, 2]
-    zero, rng = np.zeros(count), np.random.default_rng(21)
-    return PathSamples(
-        s=rng.uniform(0, 1, count),
-        u=rng.uniform(0, 1, count),
-        position=np.column_stack([rng.uniform(-1, 1, (count, 2)), zero]),
-        yaw=rng.uniform(-3, 3, count),
-        tangent=rng.uniform(-1, 1, (count, 3)),
-        twist=twist,
-        twist_rate=rate,
-        acceleration_rate=np.column_stack(
-            [rate[:, 0] - w * twist[:, 1], rate[:, 1] + w * twist[:, 0], zero]
-        ),
-        gravity=np.column_stack([zero, zero, zero - 1]),
-        curvature=rng.uniform(-1, 1, count),
-        slope=zero,
-        velocity=np.column_stack([twist[:, :2], zero]),
-        turning=np.column_stack([zero, zero, w]),
-        turning_rate=np.column_stack([zero, zero, rate[:, 2]]),
-    )
-
-
-def _grips(limit: Slip, robot: Robot) -> tuple[Array, float]:
-    """(K,): friction of the wheels that hold, else 0; and the mean of those that do."""
-    holds = holds_of(robot).wheels
-    mu = np.broadcast_to(np.asarray(limit.friction, dtype=np.float64), len(robot.body.contacts))
-    grips = np.zeros(len(mu))
-    grips[holds] = mu[holds]
-    return grips, float(mu[holds].mean())

@@ -6,6 +6,7 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.kernels import kernel
+from trajopt.paths.find import cell_at
 
 FEATURES = 11  # vx, vy, w, p per sigma, their derivatives along sigma, w^2, w vx, w vy
 
@@ -52,9 +53,9 @@ def feature(f: Array, t: float, length: float, free: bool, out: Array) -> float:
 def features(knots: Array, cubics: Array, length: float, free: bool, u: Array) -> Array:
     """(P, FEATURES) at spline parameters u (P,); ``length`` as in ``spread``."""
     found = np.empty((len(u), FEATURES))
-    segments = np.searchsorted(knots, u, side="right") - 1
+    i = 0
     for k in range(len(u)):
-        i = min(max(segments[k], 0), len(cubics) - 1)
+        i = cell_at(knots, len(cubics), u[k], i)
         feature(cubics[i], u[k] - knots[i], length, free, found[k])
     return found
 
@@ -84,8 +85,9 @@ def linear(
 @kernel(nogil=True)
 def speed_bounds(at: Array, speeds: Array, owner: IndexArray, bounds: Array) -> None:
     """Raises the bounds (L, P) on sigma'^2 from |speeds (Q, 4) . T| sigma' <= 1."""
-    bounds[:] = np.inf
     for k in range(len(at)):
+        for q in range(len(bounds)):
+            bounds[q, k] = np.inf
         for q in range(len(owner)):
             rate = (
                 speeds[q, 0] * at[k, 0]
@@ -115,7 +117,7 @@ def slip_rows(
     cog: Array,
     grips: Array,
     gravity: float,
-    normals: Array,
+    pushes: Array,
     inside: float,
     scale: float,
     first: int,
@@ -123,8 +125,9 @@ def slip_rows(
     b: Array,
     c: Array,
 ) -> None:
-    """As ``Slip`` where wheels share the force as their loads allow; ``grips`` (K,): friction of
-    the wheels that hold, else 0."""
+    """As ``Slip`` where all that hold along and across are rigid: ``pushes`` (R, 3) times force and
+    yaw moment over angular acceleration <= ``grips`` (K,) times load, friction of the wheels that
+    hold it, else 0."""
     for k in range(len(at)):
         # Loads of least norm are B' (B B')^-1 (fz, -h fx, -h fy) with columns (1, x, y) of B.
         xx = xy = yy = sx = sy = 0.0
@@ -143,10 +146,11 @@ def slip_rows(
         w0 = g0 / count - mx * w1 - my * w2
         ax, ay, bx, by = _force(at[k], cog)
         load = inside / scale * cog[2]
-        for r in range(len(normals)):
-            nx, ny = normals[r, 0] / scale + load * w1, normals[r, 1] / scale + load * w2
-            a[k, first + r] = nx * ax + ny * ay
-            b[k, first + r] = nx * bx + ny * by
+        for r in range(len(pushes)):
+            nx, ny = pushes[r, 0] / scale + load * w1, pushes[r, 1] / scale + load * w2
+            turn = pushes[r, 2] / scale
+            a[k, first + r] = nx * ax + ny * ay + turn * at[k, 2]
+            b[k, first + r] = nx * bx + ny * by + turn * at[k, 6]
             c[k, first + r] = inside * w0 * gravity / scale
 
 
@@ -165,7 +169,7 @@ def tip_rows(
 ) -> None:
     """As ``Tip``: the edge of the support that starts at each contact, if one does."""
     count = arms.shape[1]
-    follows = np.full(count, -1)
+    follows = np.empty(count, dtype=np.intp)
     for k in range(len(at)):
         ax, ay, bx, by = _force(at[k], cog)
         if k == 0 or not _surround(arms[k], follows):

@@ -93,7 +93,12 @@ def _least_time(h: float, lines: Array) -> float:
             if e0 * e1 < 0 and np.isfinite(e0) and np.isfinite(e1):
                 breaks[count] = e0 / (e0 - e1)
                 count += 1
-    breaks[:count].sort()
+    for n in range(2, count):  # into ascending order; five at most
+        value, i = breaks[n], n
+        while i > 0 and breaks[i - 1] > value:
+            breaks[i] = breaks[i - 1]
+            i -= 1
+        breaks[i] = value
     total, before, at = 0.0, 0.0, 0.0
     for n in range(count):
         t = breaks[n]

@@ -14,6 +14,7 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.kernels import kernel
+from trajopt.paths.find import cell_at, longer, longer_indices
 
 _TURN, _SWING, _RATIO = (
     0.3,
@@ -93,9 +94,9 @@ def paces(knots: Array, cubics: Array, length: float, free: bool, u: Array) -> A
 def stretch(knots: Array, cubics: Array, length: float, u: Array) -> tuple[Array, Array]:
     """(N,) each: dsigma/ds and its derivative along s at u, where the heading is the path's."""
     g, slope = np.empty(len(u)), np.empty(len(u))
-    segments = np.searchsorted(knots, u, side="right") - 1
+    i = 0
     for k in range(len(u)):
-        i = min(max(segments[k], 0), len(cubics) - 1)
+        i = cell_at(knots, len(cubics), u[k], i)
         t, f = u[k] - knots[i], cubics[i]
         x1 = f[1, 0] + t * (2 * f[2, 0] + t * 3 * f[3, 0])
         y1 = f[1, 1] + t * (2 * f[2, 1] + t * 3 * f[3, 1])
@@ -124,9 +125,9 @@ def inside(
     """(M,): u in the cells from left to right (M,) whose sigma is d, where sigma has grown by
     ``gained``: inverse cubic, then Newton in brackets."""
     found = np.empty(len(gained))
-    segments = np.searchsorted(knots, left, side="right") - 1
+    i = 0
     for n in range(len(gained)):
-        i = min(max(segments[n], 0), len(cubics) - 1)
+        i = cell_at(knots, len(cubics), left[n], i)
         low, high, aim = left[n] - knots[i], right[n] - knots[i], gained[n]
         start, h = low, high - low
         if aim <= 0 or d[n] <= 0:
@@ -184,12 +185,8 @@ def base_cells(
             fine = turn <= _TURN and first + second <= _SWING and high <= _RATIO * low
             if fine or waiting > _DEEPEST or not left < middle < right:
                 if count >= size:
-                    left_ends, sigma = (
-                        np.concatenate((left_ends, left_ends)),
-                        np.concatenate((sigma, sigma)),
-                    )
-                    weight = np.concatenate((weight, weight))
-                    segment = np.concatenate((segment, segment))
+                    left_ends, sigma, weight = longer(left_ends), longer(sigma), longer(weight)
+                    segment = longer_indices(segment)
                     size = len(sigma)
                 bend = np.sqrt(
                     (a0 - 2 * a1 + a2) ** 2 + (b0 - 2 * b1 + b2) ** 2 + (c0 - 2 * c1 + c2) ** 2
@@ -208,12 +205,7 @@ def base_cells(
             else:
                 ends[waiting] = middle
                 waiting += 1
-    return (
-        left_ends[:count].copy(),
-        sigma[:count].copy(),
-        weight[:count].copy(),
-        segment[:count].copy(),
-    )
+    return left_ends[:count], sigma[:count], weight[:count], segment[:count]
 
 
 @kernel(nogil=True)
@@ -223,14 +215,16 @@ def spread(
     """Grid u with about ``cells`` cells in proportion to the weight of base cells, all knots, and
     at least ``least`` cells a segment."""
     segments = len(knots) - 1
-    sums = np.zeros(segments)
+    sums, total, needed = np.zeros(segments), 0.0, 0
     for k in range(len(left)):
         sums[segment[k]] += weight[k]
-    total = sums.sum()
+    for i in range(segments):
+        total += sums[i]
     counts = np.empty(segments, dtype=np.intp)
     for i in range(segments):
         counts[i] = max(least, int(np.ceil(cells * sums[i] / total - 1e-9)))
-    u = np.empty(counts.sum() + 1)
+        needed += counts[i]
+    u = np.empty(needed + 1)
     at, k = 0, 0
     for i in range(segments):
         u[at] = knots[i]

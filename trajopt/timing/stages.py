@@ -15,7 +15,7 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.errors import ArgumentError
-from trajopt.limits.limit import Limit, is_linear
+from trajopt.limits.limit import Limit
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 from trajopt.timing.track import Track
@@ -152,20 +152,6 @@ def _rows_inside(
         for target, piece in zip(found, pieces, strict=True):
             target[part] = piece
     return found, replace(rows, edges=tuple(sorted(edges)))
-
-
-def tangent(track: Track, fine: FineRows, limits: Sequence[Limit], sd2: Array) -> FineRows:
-    """``fine`` with the rows of limits that are not linear taken at the profile s'^2 (N+1,)."""
-    bent = [k for k, limit in enumerate(limits) if not is_linear(limit)]
-    if not bent:
-        return fine
-    columns = np.flatnonzero(np.isin(fine.row_owner, bent))
-    some = [limits[k] for k in bent]
-    (_, *rows, _), _ = _rows_inside(track, fine.u[:-1], fine.u[1:], some, sd2)
-    a, b, c = fine.a.copy(), fine.b.copy(), fine.c.copy()
-    for whole, part in zip((a, b, c), rows, strict=True):
-        whole[:, :, columns] = part
-    return replace(fine, a=a, b=b, c=c)
 
 
 def refined(track: Track, fine: FineRows, u: Array, limits: Sequence[Limit]) -> FineRows:

@@ -29,7 +29,7 @@ export class Eye {
     const target = whole ? subject.middle : subject.place.clone().setZ(subject.place.z + 0.25 * subject.size);
     const away = new Vector3(x * Math.cos(turn) - y * Math.sin(turn), x * Math.sin(turn) + y * Math.cos(turn), z).normalize();
     const narrow = Math.min(1, this.camera.aspect);
-    const reach = whole ? subject.extent : subject.size * (name === "wheel" ? 0.85 : 1.5);
+    const reach = whole ? subject.extent : subject.size * (name === "wheel" ? 1 : 1.5);
     this.controls.target.copy(target);
     this.camera.position.copy(target).addScaledVector(away, (0.92 * reach) / Math.tan((this.camera.fov * Math.PI) / 360) / narrow);
     this.last = subject.place.clone();

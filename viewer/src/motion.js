@@ -46,7 +46,7 @@ const forces = robots.map((robot) => new Forces(robot));
 const across = Math.hypot(data.scene.high[0] - data.scene.low[0], data.scene.high[1] - data.scene.low[1]);
 const wide = Math.max(0.02 * model.size, 0.0022 * across);
 const paths = data.motions.map((motion, k) =>
-  ribbon(motion.base, k === solid ? wide : 2.2 * wide, 0.004 + 0.002 * k, COLOURS[k % COLOURS.length]));
+  ribbon(motion.base, motion.ground, k === solid ? wide : 2.2 * wide, (data.scene.ground ? 0.012 : 0.004) + 0.002 * k, COLOURS[k % COLOURS.length]));
 const marks = hitMarks(data.hits, model.size, 0);
 robots.forEach((robot, k) => scene.add(robot.group, paths[k], forces[k].group));
 if (marks.length) scene.add(...marks);

@@ -5,11 +5,12 @@ import {
 } from "three";
 import { between, locate } from "./data.js";
 import { Merged } from "./merged.js";
-import { geometryOf } from "./shapes.js";
+import { geometryOf, MANY } from "./shapes.js";
 
 const MARK = new Color("#e8e8e4"); // of what shows how a wheel has turned
 const ROD = new Color("#5c6670"); // of what holds wheels
 const ONE = new Vector3(1, 1, 1);
+const BEHIND = { polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }; // where both are, the solid one shows
 
 function poseMatrix(row, i) {
   const at = row.subarray(7 * i, 7 * i + 7);
@@ -56,8 +57,11 @@ export class Robot {
   build(tint) {
     const { looks, geometries } = this.model;
     const material = new MeshLambertMaterial({ vertexColors: true });
-    if (tint) Object.assign(material, { transparent: true, opacity: 0.34, depthWrite: false });
-    this.merged = new Merged(looks.map(({ shape, colour }) => ({
+    if (tint) Object.assign(material, { transparent: true, opacity: 0.34, depthWrite: false, ...BEHIND });
+    // Of a robot that is only hinted at, rollers are left out where they are many.
+    const bare = tint && this.model.count > MANY;
+    this.looks = looks.filter(({ link }) => !bare || this.model.data.roles[link] !== "roller");
+    this.merged = new Merged(this.looks.map(({ shape, colour }) => ({
       geometry: geometries[shape], colour: tint ? colour.clone().lerp(new Color(tint), 0.75) : colour,
     })));
     this.mesh = new Mesh(this.merged.geometry, material);
@@ -80,7 +84,7 @@ export class Robot {
   addNose(tint) {
     const look = this.model.looks.find(({ link }) => link === 0), [x, y, z] = this.model.data.shapes[look.shape].size;
     const shape = new Shape([new Vector2(0.88 * x, 0), new Vector2(0.5 * x, 0.38 * y), new Vector2(0.5 * x, -0.38 * y)]);
-    const material = new MeshBasicMaterial({ color: tint ?? "#f3c84b", transparent: Boolean(tint), opacity: tint ? 0.5 : 1 });
+    const material = new MeshBasicMaterial({ color: tint ?? "#f3c84b", transparent: Boolean(tint), opacity: tint ? 0.5 : 1, ...(tint ? BEHIND : {}) });
     this.nose = { mesh: new Mesh(new ShapeGeometry(shape).translate(0, 0, 1.004 * z + 0.001), material), look };
     this.nose.mesh.matrixAutoUpdate = false;
     this.group.add(this.nose.mesh);
@@ -105,7 +109,7 @@ export class Robot {
       world[i].multiply(turn);
     }
     const placed = new Matrix4();
-    model.looks.forEach((look, k) => this.merged.place(k, placed.multiplyMatrices(world[look.link], look.pose).elements));
+    this.looks.forEach((look, k) => this.merged.place(k, placed.multiplyMatrices(world[look.link], look.pose).elements));
     this.merged.update();
     this.nose.mesh.matrix.multiplyMatrices(world[0], this.nose.look.pose);
     for (const { lines, look } of this.edges) lines.matrix.multiplyMatrices(world[look.link], look.pose);

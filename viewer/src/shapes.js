@@ -3,7 +3,7 @@ import {
   BoxGeometry, BufferAttribute, BufferGeometry, CylinderGeometry, LatheGeometry, SphereGeometry, Vector2,
 } from "three";
 
-const MANY = 300; // rollers from which on each is drawn with fewer faces
+export const MANY = 300; // bodies from which on rollers are drawn with fewer faces
 const ROUND = 28; // sides of a wheel
 
 function hull({ corners, faces }) {

@@ -50,7 +50,7 @@ def turn() -> Trajectory:
     points = np.vstack(
         [[-3, 0], [-1.5, 0], np.column_stack([1.5 * np.sin(angle), 1.5 - 1.5 * np.cos(angle)])]
     )
-    return time_scale(Path.through(points), [*MOTORS, Slip(0.332, per_wheel=True)], robot=ROBOT)
+    return time_scale(Path.through(points), [*MOTORS, Slip(0.332)], robot=ROBOT)
 
 
 def test_weight_and_straight_motion() -> None:
@@ -83,7 +83,7 @@ def test_tip_binds_with_grip_and_height() -> None:
     casters down (what is left is the pitch of the compliant contacts), 30 % beyond the limit lifts
     them."""
     tall = shipped("powerbot", {**BALANCED, "body.cog": [-0.132, 0.0, 0.6]})
-    limits = [Speed(2.0), Acceleration(0.55, 7.8), Slip(1.2, per_wheel=True), Tip(reserve=0.03)]
+    limits = [Speed(2.0), Acceleration(0.55, 7.8), Slip(1.2), Tip(reserve=0.03)]
     plan = time_scale(Path.through([[0, 0], [6, 0]]), limits, robot=tall)
     assert any(part.limit == "tip" for part in plan.active)
     within = drive_plan(plan, Scene(1.2, Flat()))
@@ -99,9 +99,7 @@ def test_closed_loop_up_a_ramp() -> None:
         Path.through([[0, 0], [4, 0.2], [8, 0]], start_direction=[1, 0], end_direction=[1, 0]),
         [ramp],
     )
-    plan = time_scale(
-        path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.7 * 0.332, per_wheel=True)], robot=ROBOT
-    )
+    plan = time_scale(path, [Speed(1.0), Acceleration(0.55, 7.8), Slip(0.7 * 0.332)], robot=ROBOT)
     seen = drive_plan(plan, Scene(0.332, Ramps((ramp,), grade=0.2)), tracker=Tracker())
     assert np.degrees(-seen.recording.pitch).max() == pytest.approx(6.0, abs=0.5)
     assert seen.goal_offset < 0.02
@@ -140,7 +138,7 @@ def with_friction(task: Problem, share: float) -> list[Limit]:
     kept = [
         x for x in task.replace({"limits.variant": None}).limits if x.name not in ("slip", "tip")
     ]
-    return [*kept, Slip(share * task.scene.friction, per_wheel=True)]
+    return [*kept, Slip(share * task.scene.friction)]
 
 
 def assert_safe_and_at_the_goal(seen: DrivenEncounter) -> None:
@@ -162,7 +160,7 @@ def test_a_disc_that_crosses_is_let_by() -> None:
     """In the way of a robot that would be there at the same time; the same disc in front of a blind
     robot is hit."""
     path = Path.through([[0, 0], [3, 0]])
-    limits = [Speed(0.5), Acceleration(0.55, 1.5), Slip(0.8 * 0.332, per_wheel=True)]
+    limits = [Speed(0.5), Acceleration(0.55, 1.5), Slip(0.8 * 0.332)]
     where = course(time_scale(path, limits, robot=ROBOT), ROBOT)
     visitor = Visitor(appears=1.0, stays=6.0, distance=1.6, aside=-1.6, speed=0.5)
     seen = drive_encounter(

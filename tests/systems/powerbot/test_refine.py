@@ -114,7 +114,9 @@ def test_a_jerk_limited_motion_is_a_whole_trajectory(tmp_path: FilePath) -> None
 def test_jerk_limit_on_a_bend_keeps_slip(straight: Trajectory) -> None:
     path = Path.through([[0, 0], [2, 0.5], [4, -0.3]], start_direction=[1, 0], end_direction=[1, 0])
     fast = time_scale(
-        path, [Speed(1.5), Acceleration(0.55, 7.8), Slip(0.332)], robot=shipped("powerbot")
+        path,
+        [Speed(1.5), Acceleration(0.55, 7.8), Slip(0.332, rule="load")],
+        robot=shipped("powerbot"),
     )
     durations = [limit_jerk(fast, jerk).duration for jerk in (0.5, 2.0, 8.0)]
     assert durations[0] > durations[1] > durations[2] > fast.duration
@@ -126,7 +128,7 @@ def test_jerk_limit_over_a_ramp_keeps_every_row() -> None:
     """Slip rows jump at the ramp's rounded edges; rows left out of the program are checked like the
     others."""
     path = Path.through([[0, 0], [4, 0.3], [8, 0]], start_direction=[1, 0], end_direction=[1, 0])
-    limits = [Speed(2.1), Acceleration(0.55, 7.8), Slip(0.332), Tip()]
+    limits = [Speed(2.1), Acceleration(0.55, 7.8), Slip(0.332, rule="load"), Tip()]
     fast = time_scale(
         lay_over(path, [Ramp((2.0, 0.0), 0.0, 4.266, 0.45, 0.35)]),
         limits,

@@ -67,10 +67,16 @@ def view_data(
         "about": about,
         "robot": robot_data(robot),
         "scene": scene_data(scene, places),
-        "motions": [motion_data(motion, robot) for motion in motions],
+        "motions": [motion_data(motion, robot) | _under(motion, scene) for motion in motions],
         "hits": [],
         "plots": [] if trajectory is None else _plots(trajectory, motions, robot),
     }
+
+
+def _under(motion: Motion, scene: Scene) -> dict[str, Any]:
+    """Heights of the ground below the robot, or of what it stands on where that is higher."""
+    x, y, z = motion.place.T
+    return {"ground": packed(np.maximum(scene.ground.height(x, y), z))}
 
 
 def read_columns(file: FilePath) -> dict[str, Array]:

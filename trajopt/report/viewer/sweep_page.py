@@ -35,7 +35,7 @@ def sweep_data(frame: pd.DataFrame, value: str | None = None) -> dict[str, Any]:
     names = [name for name in frame.columns if frame[name].notna().any()]
     of_run = [name for name in names if name in FIXED_COLUMNS]
     own = [name for name in names if name not in of_run]
-    axes = [name for name in own if _varies(frame[name])]
+    axes = [name for name in own if name != "repeat" and _varies(frame[name])]
     columns = [_column(frame[name], name in axes) for name in [*own, *of_run]]
     outcomes = [name for name in own if name not in axes and frame[name].dtype.kind in "fib"]
     flags = [

@@ -72,7 +72,7 @@ def random_corridor(seed: int, kind: Literal["length", "duration"]) -> RouteObje
         np.array(bounds),
         POWERBOT,
         (
-            Slip(FRICTION),
+            Slip(FRICTION, rule="load"),
             Speed(LARGEST_SPEED),
             Acceleration(LARGEST_ACCELERATION, LARGEST_ACCELERATION),
         ),
