@@ -21,6 +21,8 @@ ROOT = Path(__file__).parents[1]
 PROBLEM = ROOT / "problems" / "smdw" / "table_5_3_1s.toml"
 # The command, saying when its search is on the way.
 TELLING = """
+import signal
+signal.signal(2, signal.default_int_handler)  # ignored in what a shell runs behind itself
 from trajopt.cli import main
 from trajopt.optimize.run import Run
 remember = Run.remember
@@ -58,11 +60,14 @@ def searched(out: Path) -> dict[str, object]:
 def test_a_stopped_search_is_written(name: str, kind: signal.Signals, tmp_path: Path) -> None:
     out = tmp_path / "run"
     resumed = ["--resume"] if name != "ipopt" else []
-    process = begun(out, "--optimizer", name, "--evaluations", "100000000", *resumed)
+    process = begun(out, "--optimizer", name, "--seconds", "200", *resumed)
     assert process.stdout is not None
     assert process.stdout.readline() == "searching\n", process.communicate()
     process.send_signal(kind)
-    said, errors = process.communicate(timeout=60)
+    try:
+        said, errors = process.communicate(timeout=100)
+    finally:
+        process.kill()
     assert process.returncode == 130, errors
     assert f"written to {out}" in said
     assert searched(out)["status"] == "INTERRUPTED"

@@ -184,7 +184,7 @@ def test_saved_and_resumed_is_the_search_in_one_go(name: str, tmp_path: Path) ->
 
 
 def test_methods_without_a_state_say_so(tmp_path: Path) -> None:
-    with pytest.raises(ArgumentError, match="only pso"):
+    with pytest.raises(ArgumentError, match="only auto, pso"):
         minimize(square, BOX, optimizer="slsqp", state=tmp_path / "s.npz")
     with pytest.raises(ArgumentError, match="folder"):
         minimize(square, BOX, optimizer="pso", state=tmp_path / "no" / "s.npz")

@@ -211,3 +211,19 @@ def test_restarts_use_the_whole_budget_and_lose_nothing(option: int) -> None:
     assert again.fun <= plain.fun
     same = minimize(rastrigin, bounds, optimizer=replace(once, restart=True), seed=4, budget=budget)
     assert same.x.tobytes() == again.x.tobytes()
+
+
+def test_the_thesis_swarm_starts_and_resets_as_its_table_says() -> None:
+    """[guzman2015], Table 5.4 on a space of 2 m: P2 starts from x = 1.17 to 1.83 m and is reset into 1.0 to
+    1.9 m."""
+    swarm = thesis_enhanced().swarm([[0.0, 2.0], [-1.5, 1.5]], np.random.default_rng(0))
+    np.testing.assert_allclose(np.unique(swarm.x[:, 0]), 1 + np.arange(1, 6) / 6)
+    assert np.ptp(swarm.x[:, 1]) > 2.0
+    swarm.x[:] = 9.0
+    swarm.v[:] = 0.0
+    swarm.own[:] = 9.0
+    swarm.tell(np.zeros(50))
+    assert 1.0 <= swarm.x[:, 0].min() < 1.1
+    assert 1.8 < swarm.x[:, 0].max() <= 1.9
+    assert -1.35 <= swarm.x[:, 1].min() < -1.1
+    assert np.all(swarm.v == 0.0)

@@ -73,7 +73,8 @@ def test_a_batch_is_cut_where_the_time_ends() -> None:
 
 
 SIGNALLED = """
-import sys, time
+import signal, sys, time
+signal.signal(2, signal.default_int_handler)  # ignored in what a shell runs behind itself
 import numpy as np
 from trajopt.optimize.base import Budget
 from trajopt.optimize.search import minimize
@@ -103,7 +104,7 @@ def test_signals_bring_back_the_best(name: str, kind: signal.Signals) -> None:
         assert search.stdout.readline() == "asked\n"
     search.send_signal(kind)
     sent = time.perf_counter()
-    rest = search.communicate(timeout=10)[0].splitlines()
+    rest = search.communicate(timeout=30)[0].splitlines()
     assert time.perf_counter() - sent < 5.0  # of 20 s; the machine may be busy
     assert rest[-1].startswith("ended INTERRUPTED")
     assert float(rest[-1].split()[-1]) < 2000.0

@@ -34,7 +34,7 @@ from trajopt.optimize.run import Run
 from trajopt.optimize.swarm import Swarm, SwarmRules, warm
 from trajopt.optimize.violations import Levels
 
-Boundary = Literal["reset", "reflect", "mirror", "absorb", "invisible", "none"]
+Boundary = Literal["reset", "upper reset", "reflect", "mirror", "absorb", "invisible", "none"]
 _LOST = 1_000  # iterations with all particles invisible after which a search ends, chosen
 _REPAIRED = 10  # iterations between repairs of the best where there are equalities, chosen
 _CLAN, _SPREAD = 3, 0.03  # particles of a clan, and their spread in widths; chosen
@@ -42,8 +42,8 @@ _MOST = 50  # particles in clans, chosen
 _FEWEST = 13  # particles that a population by dimension has at least
 _CHOICES = {
     "topology": ("gbest", "ring"),
-    "boundary": ("reset", "reflect", "mirror", "absorb", "invisible", "none"),
-    "start": ("uniform", "grid", "sobol"),
+    "boundary": ("reset", "upper reset", "reflect", "mirror", "absorb", "invisible", "none"),
+    "start": ("uniform", "grid", "upper grid", "sobol"),
 }
 
 
@@ -52,12 +52,13 @@ class ParticleSwarm:
     """PSO. Defaults are the constriction PSO with a global best; the functions below are presets.
 
     ``boundary``: what happens to a particle that leaves the bounds. "reset" draws a new position
-    inside 0.9 of the space ([guzman2015], Table 5.4) and stops the particle; "reflect" mirrors it
+    inside 0.9 of the space and stops the particle, "upper reset" in the upper half of the first
+    variable ([guzman2015], Table 5.4); "reflect" mirrors it
     back and reverses its velocity in that dimension; "mirror" mirrors it back alone (as pyswarms's
     "reflective"); "absorb" puts it on the border and stops it there; "invisible" lets it fly on
     without evaluating it [robinson2004]; "none" evaluates it outside, where it
     counts as infeasible. ``start``: "uniform" draws positions uniformly; "grid" lays the first two
-    variables on a grid (Table 5.4); "sobol" takes a Sobol sequence with a random shift.
+    variables on a grid, "upper grid" in the upper half of the first (Table 5.4); "sobol" takes a Sobol sequence with a random shift.
     ``velocity_limit``: largest velocity as a share of the width of the bounds; None: unlimited.
     ``particles``: None for 12 + 2 sqrt(d), so many that a budget of some 1,000 d is best used.
     ``horizon``: iterations over which the inertia falls; None: over the budget, evaluations or
@@ -80,7 +81,7 @@ class ParticleSwarm:
     topology: Literal["gbest", "ring"] = "gbest"
     neighbours: int = 1  # on each side of the ring; [bratton2007]
     boundary: Boundary = "reflect"  # chosen
-    start: Literal["uniform", "grid", "sobol"] = "uniform"
+    start: Literal["uniform", "grid", "upper grid", "sobol"] = "uniform"
     velocity_limit: float | None = (
         None  # the constriction factor makes one unnecessary, [clerc2002]
     )
@@ -117,7 +118,8 @@ class ParticleSwarm:
         """
         warm()
         run.constructed()
-        own = getattr(run.objective, "starts", list)() if self.start != "grid" else ()
+        offered = getattr(run.objective, "starts", tuple) if "grid" not in self.start else tuple
+        own: Array = np.asarray(offered())
         options = self
         if len(own) and self.particles is None:
             options = replace(self, particles=min(_MOST, max(_FEWEST, _CLAN * len(own))))
@@ -246,4 +248,6 @@ def thesis_enhanced() -> ParticleSwarm:
 
     As undamped as the first one; the resets keep it inside, where it samples rather than converges.
     """
-    return ParticleSwarm(inertia=1.0, cognitive=0.15, social=0.15, boundary="reset", start="grid")
+    return ParticleSwarm(
+        inertia=1.0, cognitive=0.15, social=0.15, boundary="upper reset", start="upper grid"
+    )

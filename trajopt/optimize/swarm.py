@@ -285,7 +285,7 @@ class Swarm:
                 return  # no coordinate lies outside
         else:
             self._move_readably(r)
-        if rules.boundary in ("reset", "reflect", "mirror", "absorb"):
+        if rules.boundary in ("reset", "upper reset", "reflect", "mirror", "absorb"):
             outside = (x < low) | (x > high)
             if outside.any():
                 rows, columns = outside.nonzero()
@@ -325,9 +325,12 @@ def _bring_back(
     rng: Generator,
 ) -> None:
     """Apply a boundary rule to the coordinates outside, x[rows, columns], in place."""
-    if boundary == "reset":  # [guzman2015], Table 5.4: anew, inside 0.9 of the space
+    if boundary in ("reset", "upper reset"):  # [guzman2015], Table 5.4: anew, in 0.9 of the space
         lost, width = np.unique(rows), high - low
-        x[lost] = low + width / 2 + 0.9 * (rng.random((len(lost), x.shape[1])) - 0.5) * width
+        drawn = rng.random((len(lost), x.shape[1])) - 0.5
+        if boundary == "upper reset":
+            drawn[:, 0] = (drawn[:, 0] + 0.5) / 2
+        x[lost] = low + width / 2 + 0.9 * drawn * width
         v[lost] = 0.0
         return
     at, least, most = x[rows, columns], low[columns], high[columns]
@@ -371,11 +374,12 @@ def _positions(rules: SwarmRules, bounds: Array, rng: Generator) -> Array:
         unit = qmc.Sobol(d, scramble=False).random(count)[:n]
         return np.asarray(low + width * ((unit + rng.random(d)) % 1.0))
     x = low + width * rng.random((n, d))
-    if rules.start == "grid" and d >= 2:
+    if rules.start in ("grid", "upper grid") and d >= 2:
         # Table 5.4 prints a row index it does not use; we read a grid of n/10 columns by 10 rows
         # with spacings of 1/(n/10 + 1) and 1/11 of the space.
         columns = max(1, n // 10)
         i = np.arange(n)
-        x[:, 0] = low[0] + width[0] * (i // 10 % columns + 1) / (columns + 1)
+        share = (i // 10 % columns + 1) / (columns + 1)
+        x[:, 0] = low[0] + width[0] * (share if rules.start == "grid" else 0.5 + share / 2)
         x[:, 1] = low[1] + width[1] * (i % 10 + 1) / 11
     return np.asarray(x)
