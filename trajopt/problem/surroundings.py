@@ -104,7 +104,9 @@ class PolygonSection(_Standing):
     corners: Corners | None = Field(
         None, description="x, y, m, counter-clockwise, no crossing edges", min_length=3
     )
-    holes: tuple[Corners, ...] = Field((), description="polygons inside that are free, with corners")
+    holes: tuple[Corners, ...] = Field(
+        (), description="polygons inside that are free, with corners"
+    )
     file: str | None = Field(
         None,
         description="instead of corners: GeoJSON, or CSV with columns polygon, x, y (m); from the "
@@ -126,8 +128,7 @@ class PolygonSection(_Standing):
         if len(shapes) == 1 and not self.holes:
             return (Polygon(self.name, self.height, _ring(shapes[0])),)
         return tuple(
-            Polygon(f"{self.name}/{k}", self.height, _ring(shape))
-            for k, shape in enumerate(shapes)
+            Polygon(f"{self.name}/{k}", self.height, _ring(shape)) for k, shape in enumerate(shapes)
         )
 
     def shapes(self, folder: FilePath) -> Iterator[shapely.Polygon]:

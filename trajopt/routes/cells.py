@@ -20,7 +20,7 @@ SLOWEST, FASTEST = 0.4, 2.5  # bounds of |q'| as shares of its mean: no cusps, n
 _STILL = 1e-9  # m/s; added to sums of speeds, so that no time is infinite
 _ROUND = 1e-3  # m/s^2: rounds the corner of max(u, 0)
 _TINY = 1e-12  # under roots of sums of squares that may vanish
-_FIXED = 15  # shared numbers before the rows of rates
+_FIXED = 16  # shared numbers before the rows of rates
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def shared_numbers(envelope: Envelope, kind: Kind, cost: list[float]) -> Array:
     """What all cells share: weights of time, length, bend and evenness, mean |q'|, then limits."""
     e = envelope
     inverse = [1 / v for v in (*e.ellipse, *e.box, e.curvature)]
-    rest = [e.base, 1 / e.turning if kind.steers else 0.0, e.length, e.lever]
+    rest = [e.base, 1 / e.turning if kind.steers else 0.0, e.length, *e.cog]
     fixed = [*cost, *inverse, *rest]
     return np.concatenate([fixed, e.first.ravel(), e.second.ravel(), e.changes])
 
@@ -171,11 +171,12 @@ def _cell(ca: Any, kind: Kind, z: Any, w: Any, shared: Any) -> tuple[Any, Any, A
     turning = (right.twist[2] * vb - left.twist[2] * va) * (va + vb) / (2 * ds)
     for end, v in ((left, va), (right, vb)):
         along, across = end.acceleration(u, v)
-        for sign in (-1.0, 1.0):  # what turns the body is taken from what moves it, on either side
-            ahead = along + sign * shared[14] * turning
-            half = ca.sqrt(ahead**2 + _ROUND**2)
-            grip = ((ahead + half) / 2 * shared[5]) ** 2 + ((half - ahead) / 2 * shared[6]) ** 2
-            keep(grip + (across * shared[7]) ** 2, -np.inf, 1.0)
+        square = (end.twist[2] * v) ** 2  # at the centre of gravity, not at the origin
+        ahead = along - turning * shared[15] - square * shared[14]
+        beside = across + turning * shared[14] - square * shared[15]
+        half = ca.sqrt(ahead**2 + _ROUND**2)
+        grip = ((ahead + half) / 2 * shared[5]) ** 2 + ((half - ahead) / 2 * shared[6]) ** 2
+        keep(grip + (beside * shared[7]) ** 2, -np.inf, 1.0)
     keep(u * shared[8], -np.inf, 1.0)
     keep(u * shared[9], -1.0, np.inf)
     keep(right.rate / shared[4], SLOWEST, FASTEST)

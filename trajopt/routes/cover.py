@@ -34,10 +34,14 @@ def cover(footprint: Sequence[tuple[float, float]]) -> Cover:
     shape = shapely.Polygon(footprint)
     low, high = np.reshape(shape.bounds, (2, 2))
     spacing = float((high - low).max()) / _SIDE
-    x, y = np.meshgrid(*(np.arange(a, b, spacing) + spacing / 2 for a, b in zip(low, high, strict=True)))
+    x, y = np.meshgrid(
+        *(np.arange(a, b, spacing) + spacing / 2 for a, b in zip(low, high, strict=True))
+    )
     centres = np.column_stack([x.ravel(), y.ravel()])
     middle = (low + high) / 2  # and on the axes of symmetry, where a rectangle's best discs are
-    centres = np.vstack([centres, centres * [1, 0] + [0, middle[1]], centres * [0, 1] + [middle[0], 0]])
+    centres = np.vstack(
+        [centres, centres * [1, 0] + [0, middle[1]], centres * [0, 1] + [middle[0], 0]]
+    )
     centres = centres[shapely.contains_xy(shape, centres[:, 0], centres[:, 1])]
     radii = shapely.distance(shape.exterior, shapely.points(centres))
     best = int(np.argmax(radii))

@@ -31,7 +31,7 @@ from trajopt.timing.track import track
 
 SHARPEST = 2.0  # of curvature, times the turning length; chosen: wheels then hardly reverse
 SHARE = 0.98  # of the largest steering angle that routes use; chosen, so that rounding breaks none
-_RADIUS = 2.0  # m of the circle on which friction is read; chosen
+_RADIUS = 5.0  # m of the circle on which friction is read; chosen
 _MOST = 1e3  # m/s, m/s^2: no bound
 
 
@@ -41,7 +41,7 @@ class Envelope:
     ``first`` and ``second`` (R, 3): rows of rates by body twist, scaled to 1, the second zero where
     the rate has a sign; ``changes``: of the first rows, 1 / (largest change, 1/s);
     ``curvature`` (1/m); ``base`` (m) and ``turning`` (rad/s) of the steering, 0 and inf without.
-    ``lever`` (m): acceleration along the body that an angular one of 1 rad/s^2 takes away.
+    Accelerations are those of the centre of gravity, ``cog`` (x, y), m.
     ``free``: the heading is, with ``length`` (m) as in the path parameter."""
 
     speed: float
@@ -53,7 +53,7 @@ class Envelope:
     curvature: float
     base: float
     turning: float
-    lever: float
+    cog: tuple[float, float]
     free: bool
     length: float
 
@@ -84,7 +84,7 @@ def envelope_of(robot: Robot, limits: Sequence[Limit], free: bool) -> Envelope:
         curvature,
         base,
         turning,
-        _lever(robot, rest, free, slip),
+        robot.body.cog[:2],
         free,
         robot.turning_length if free else 0.0,
     )
@@ -158,29 +158,6 @@ def _along(robot: Robot, limits: Sequence[Limit], free: bool, turn: float) -> tu
     if not (ahead > 0 and back > 0):
         raise InfeasibleError("start", 0.0, "the limits allow no motion on a straight line")
     return float(ahead), float(back)
-
-
-def _lever(
-    robot: Robot, limits: Sequence[Limit], free: bool, straight: tuple[float, float]
-) -> float:
-    """By how much less s'' may be from rest on a circle, for each 1/m of its curvature; where the
-    heading is free, from a turn on the spot."""
-    if not limits or min(straight) >= _MOST:
-        return 0.0
-    length = robot.turning_length
-    if free:
-        spot = np.zeros((3, 2))
-        path = Path.through(spot, heading=[0.0, 0.5, 1.0], turning_length=length)
-    else:
-        path = _arc(1.0)
-    at = np.array([path.length / 2])
-    rows = assemble(track(path, robot).samples(at, path.locate(at)), limits, robot)
-    a, c = rows.a[0], rows.c[0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        most = float(np.where(a > 1e-12, c / a, np.inf).min(initial=_MOST))
-    if free:
-        return min(straight) * length / most
-    return max((straight[0] / most - 1) * _RADIUS, 0.0)
 
 
 def _arc(sign: float) -> Path:

@@ -33,9 +33,7 @@ class Field:
 
     def world(self, cells: Array) -> Array:
         """(N, 2): places of columns and rows (N, 2)."""
-        return np.asarray(
-            (cells * self.spacing) @ rotation(self.origin[2]).T + self.origin[:2]
-        )
+        return np.asarray((cells * self.spacing) @ rotation(self.origin[2]).T + self.origin[:2])
 
     def at(self, places: Array) -> Array:
         """(N,): distance at places, linear between grid points, that of the border beyond."""
@@ -72,7 +70,9 @@ class Field:
     def _coefficients(self) -> Array:
         from scipy.ndimage import spline_filter
 
-        return np.asarray(np.pad(spline_filter(self.distance, order=3, mode="mirror"), 2, "reflect"))
+        return np.asarray(
+            np.pad(spline_filter(self.distance, order=3, mode="mirror"), 2, "reflect")
+        )
 
     def smooth(self, places: Array) -> Array:
         """(6, N): value of the cubic B-spline through the distances, and its derivatives by x, y,

@@ -41,8 +41,10 @@ BEND = 0.1  # m^2: weight of squared curvature beside length in the first of two
 CLOSE = 1.06  # times the least duration of two stages: slower ways are not tried in one program
 _SPACING = 0.8  # of the outline's longer side, between control points; chosen
 _FEWEST, _MOST, _STEP = 10, 64, 6  # control points, and the step between numbers of them
-_ROOM, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance, at first; added to what lacks
-_TRIES = 6  # times that more room is given
+LONGER = 1.15  # times the shortest way: longer ones are not made smooth
+_LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; added to what lacks
+_TIGHT = 0.6  # of the room beside a disc in the narrowest place: what discs may keep there
+_TRIES = 5  # times that more room is given
 _HELD = 0.95  # of the speeds of two stages that a program starts from
 _EXACT = 1e-6  # m of clearance that is rounding
 
@@ -168,6 +170,8 @@ def _attempts(job: _Job, field: Field, found: Sequence[Way]) -> Iterator[Attempt
     """Two stages for every way; then, for least time, one program from the better ones."""
     firsts = []
     for way in found:
+        if way.length > LONGER * found[0].length and firsts:
+            continue
         near = field.cropped(way.points)
         program = _program(job, way)
         start = _guess(job, way, program)
@@ -208,7 +212,7 @@ def _free(
 ) -> tuple[Attempt, Solved]:
     """The program's path with as much room as the outline itself needs, and its timing."""
     weights = Weights(1.0) if method == "one program" else Weights(0.0, 1.0, BEND)
-    room = job.clearance + _ROOM
+    room = job.clearance + _extra(job, field, way)
     attempt, solved = Attempt(way, method), start
     for _ in range(_TRIES):
         solved = program.solve(solved, job.ends, job.envelope, job.discs, field, weights, room)
@@ -221,6 +225,15 @@ def _free(
         attempt = replace(attempt, why=f"{near}; IPOPT: {solved.status}")
         room += job.clearance - near.distance + _MORE
     return attempt, solved
+
+
+def _extra(job: _Job, field: Field, way: Way) -> float:
+    """m that discs keep beyond the clearance, so that the outline, which they leave gaps of, does:
+    all of the gap, or what the narrowest place allows."""
+    narrow = float(field.at(way.points).min()) + field.spacing / 2
+    return float(
+        np.clip(_TIGHT * (narrow - job.discs.inner[2] - job.clearance), _LEAST, job.discs.gap)
+    )
 
 
 def _timed(job: _Job, attempt: Attempt) -> Attempt:

@@ -45,6 +45,7 @@ _SETTINGS = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "ipopt.mu_init": 1e-2,
+    "ipopt.max_iter": 150,
     "ipopt.tol": 1e-4,
     "ipopt.acceptable_tol": 1e-3,
     "ipopt.acceptable_iter": 5,
@@ -105,8 +106,6 @@ class Program:
         field: Field,
         weights: Weights,
         room: float,
-        *,
-        most: int = 120,
     ) -> Solved:
         """From ``start`` to a local optimum between two poses (3,); discs keep ``room`` (m)."""
         axes, count = self.kind.axes, self.points
@@ -134,9 +133,7 @@ class Program:
         )
         shared = shared_numbers(envelope, self.kind, [*cost, scale / self.cells, mean])
         directions = [f(pose[2]) for pose in ends for f in (np.cos, np.sin)]
-        parameters = np.concatenate(
-            [shared, cover.centres.ravel(), cover.radii + room, directions]
-        )
+        parameters = np.concatenate([shared, cover.centres.ravel(), cover.radii + room, directions])
         low, high = self._bounds(mean)
         found = self.solver(
             x0=np.concatenate([start.points.ravel(), speeds]),
@@ -192,13 +189,13 @@ class Program:
         cost, rows = s.value.map(n)(*inputs)
         ends, end_slopes, end_places = self._ends(ca, x, directions)
         g = ca.vertcat(
-            ca.vec(rows), ca.vec(d[0] - ca.repmat(radii, 1, n - 1)), *([] if ends is None else [ends])
+            ca.vec(rows),
+            ca.vec(d[0] - ca.repmat(radii, 1, n - 1)),
+            *([] if ends is None else [ends]),
         )
         f = ca.sum2(cost)
         gradient, jacobian = s.slopes.map(n)(*inputs)
-        disc = s.disc_slopes.map(n - 1)(
-            at, node_weights, ca.repmat(centres, 1, n - 1), d[1], d[2]
-        )
+        disc = s.disc_slopes.map(n - 1)(at, node_weights, ca.repmat(centres, 1, n - 1), d[1], d[2])
         row, column, values = self._jacobian_places(s, end_places)
         vector = ca.vertcat(jacobian.nz[:], disc.nz[:], *([] if ends is None else [end_slopes]))
         order = np.lexsort((row, column))
@@ -213,9 +210,7 @@ class Program:
         split = ca.vertsplit(
             lam, np.cumsum([0, s.rows * n, discs * (n - 1), 0 if self.kind.free else 4]).tolist()
         )
-        bent = s.bends.map(n)(
-            *inputs, ca.repmat(sigma, 1, n), ca.reshape(split[0], s.rows, n)
-        )
+        bent = s.bends.map(n)(*inputs, ca.repmat(sigma, 1, n), ca.reshape(split[0], s.rows, n))
         disc_bent = s.disc_bends.map(n - 1)(
             at,
             node_weights,

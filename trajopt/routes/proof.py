@@ -9,7 +9,9 @@ from trajopt.arrays import Array, rotation
 from trajopt.robots.robot import Robot
 from trajopt.world.scene import Scene
 
-_ROUND = 64  # segments to a quarter of a circle; chosen: 8e-5 of a radius is left out, on the safe side
+_ROUND = (
+    64  # segments to a quarter of a circle; chosen: 8e-5 of a radius is left out, on the safe side
+)
 _FAR = 50.0  # m around everything in which a way could lead; chosen
 
 

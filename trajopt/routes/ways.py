@@ -29,7 +29,9 @@ class Way:
     length: float
 
 
-def ways(field: Field, start: Array, goal: Array, radius: float, wide: float, most: int) -> list[Way]:
+def ways(
+    field: Field, start: Array, goal: Array, radius: float, wide: float, most: int
+) -> list[Way]:
     """Up to ``most`` ways of different classes for a disc of ``radius`` (m), cheapest first; room
     up to ``wide`` (m) makes a way cheaper. Empty where there is none."""
     from scipy.sparse.csgraph import dijkstra
@@ -128,7 +130,9 @@ def _passed(before: IndexArray, rays: IntArray) -> IntArray:
     root."""
     width = rays.shape[1]
     back = np.where(before >= 0, before, np.arange(len(before)))
-    (row, column), (from_row, from_column) = (np.divmod(c, width) for c in (np.arange(len(back)), back))
+    (row, column), (from_row, from_column) = (
+        np.divmod(c, width) for c in (np.arange(len(back)), back)
+    )
     height = np.maximum(row, from_row)
     step = column - from_column
     passed = step * rays[height, np.minimum(column, from_column)]

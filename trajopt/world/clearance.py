@@ -40,7 +40,9 @@ class Clearance:
 
     def __str__(self) -> str:
         if self.distance < 0:
-            return f"the outline is {-self.distance:.3f} m inside '{self.name}' at s = {self.s:.3f} m"
+            return (
+                f"the outline is {-self.distance:.3f} m inside '{self.name}' at s = {self.s:.3f} m"
+            )
         return (
             f"the outline comes as near as {self.distance:.3f} m to '{self.name}' at "
             f"s = {self.s:.3f} m"

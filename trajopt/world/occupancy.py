@@ -183,10 +183,12 @@ def _picture(file: FilePath, source: FilePath) -> tuple[Array, BoolArray]:
                 size = f"{picture.width} x {picture.height}"
                 raise ArgumentError(where, size, f"at most {MOST_CELLS:,} cells")
             if picture.mode in ("1", "P"):
-                picture = picture.convert("RGBA" if "transparency" in picture.info else "RGB")  # type: ignore[assignment]  # noqa: PLW2901
-            if picture.mode not in ("L", "LA", "RGB", "RGBA"):
+                full = picture.convert("RGBA" if "transparency" in picture.info else "RGB")
+                values = np.asarray(full)
+            elif picture.mode in ("L", "LA", "RGB", "RGBA"):
+                values = np.asarray(picture)
+            else:
                 raise ArgumentError(where, f"{file}: mode {picture.mode}", expected)
-            values = np.asarray(picture)
     except ArgumentError:
         raise
     except FileNotFoundError:
@@ -196,5 +198,7 @@ def _picture(file: FilePath, source: FilePath) -> tuple[Array, BoolArray]:
     if values.ndim == 2:
         return values.astype(np.float64), np.ones(values.shape, dtype=bool)
     colours = values.shape[2] - (values.shape[2] in (2, 4))
-    full = values[..., -1] == 255 if colours < values.shape[2] else np.ones(values.shape[:2], bool)
-    return np.mean(values[..., :colours], axis=2, dtype=np.float64), full
+    seen = np.ones(values.shape[:2], dtype=bool)
+    if colours < values.shape[2]:
+        seen = values[..., -1] == 255
+    return np.mean(values[..., :colours], axis=2, dtype=np.float64), seen
