@@ -88,10 +88,7 @@ def _ground(problem: Problem) -> None:
     ):
         if along and problem.job.name != "path":
             raise broken_rule(key, "given", "none: its places are those of a given [path]")
-    if problem.job.name == "route" and not problem.scene.ground.level:
-        expected = "none: routes are searched on level ground; a given [path] can be driven there"
-        raise broken_rule(f"ground.{ground.kind}", "given", expected)
-    if problem.job.name != "path" and not problem.scene.ground.level:
+    if problem.job.name not in ("path", "route") and not problem.scene.ground.level:
         expected = (
             "none: what is searched has a heading of its own, and its wheel angles need level "
             "ground; a given [path] can be driven there"

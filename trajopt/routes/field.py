@@ -13,6 +13,7 @@ from trajopt.world.scene import Scene
 
 SPACING = 0.05  # m between grid points; chosen
 MOST_POINTS = 160_000  # of a field whose distances are those of polygons; chosen: 0.5 s
+MOST_CELLS = 1_000_000  # of a field made finer where it is narrow; chosen
 _AROUND = 4.0  # m around start and goal where nothing bounds the scene; chosen
 _BEYOND = 3.0  # m that a field reaches beyond the points it was asked around; chosen
 
@@ -52,6 +53,32 @@ class Field:
         x, y = self.world(low[None].astype(np.float64))[0].tolist()
         part = self.distance[low[1] : high[1], low[0] : high[0]]
         return Field(part, self.spacing, (x, y, self.origin[2]))
+
+    def roomiest(self, places: Array) -> Array:
+        """(N,): largest distance at the grid points around places (N, 2)."""
+        from scipy.ndimage import maximum_filter
+
+        column, row = np.rint(self.grid(places)).astype(np.intp).T
+        most = maximum_filter(self.distance, 3, mode="nearest")
+        rows, columns = self.distance.shape
+        return np.asarray(most[np.clip(row, 0, rows - 1), np.clip(column, 0, columns - 1)])
+
+    def finer(self, scene: Scene, spacing: float, places: Array, reach: float) -> Field:
+        """The same at a smaller ``spacing`` (m), distances anew within ``reach`` (m) of places."""
+        from scipy.ndimage import map_coordinates
+
+        rows, columns = self.distance.shape
+        size = np.array([columns - 1, rows - 1]) * self.spacing
+        spacing = max(spacing, float(np.sqrt(np.prod(size) / MOST_CELLS)))
+        count = np.floor(size / spacing).astype(int) + 1
+        row, column = np.mgrid[: count[1], : count[0]] * (spacing / self.spacing)
+        d = map_coordinates(self.distance, [row, column], order=1, mode="nearest")
+        world = self.world(np.column_stack([column.ravel(), row.ravel()]))
+        near = shapely.contains_xy(shapely.MultiPoint(places).buffer(reach, 4), *world.T)
+        exact, _ = scene.keep_out.distances(shapely.points(world[near]))
+        flat = d.ravel()
+        flat[near] = np.where(exact > 0, exact, np.minimum(flat[near], 0.0))
+        return Field(flat.reshape(d.shape), spacing, self.origin)
 
     def coarse(self, most: int) -> Field:
         """The largest distance in blocks of points, with at most about ``most`` blocks: a disc fits

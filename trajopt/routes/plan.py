@@ -43,7 +43,8 @@ _SPACING = 0.8  # of the outline's longer side, between control points; chosen
 _FEWEST, _MOST, _STEP = 10, 64, 6  # control points, and the step between numbers of them
 LONGER = 1.15  # times the shortest way: longer ones are not made smooth
 _LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; added to what lacks
-_TIGHT = 0.6  # of the room beside a disc in the narrowest place: what discs may keep there
+_TIGHT = 0.5  # of the room beside a disc in the narrowest place: what discs may keep there
+_ROUNDED = 1.8  # times that room: spacing of a field whose spline does not round a ridge off
 _TRIES = 5  # times that more room is given
 _HELD = 0.95  # of the speeds of two stages that a program starts from
 _EXACT = 1e-6  # m of clearance that is rounding
@@ -172,7 +173,7 @@ def _attempts(job: _Job, field: Field, found: Sequence[Way]) -> Iterator[Attempt
     for way in found:
         if way.length > LONGER * found[0].length and firsts:
             continue
-        near = field.cropped(way.points)
+        near = _near(job, field, way)
         program = _program(job, way)
         start = _guess(job, way, program)
         attempt, solved = _free(job, near, program, way, start, "two stages")
@@ -208,32 +209,43 @@ def _speeds(trajectory: Trajectory, program: Program) -> Array:
 
 
 def _free(
-    job: _Job, field: Field, program: Program, way: Way, start: Solved, method: Method
+    job: _Job,
+    near: tuple[Field, float],
+    program: Program,
+    way: Way,
+    start: Solved,
+    method: Method,
 ) -> tuple[Attempt, Solved]:
     """The program's path with as much room as the outline itself needs, and its timing."""
     weights = Weights(1.0) if method == "one program" else Weights(0.0, 1.0, BEND)
-    room = job.clearance + _extra(job, field, way)
+    field, extra = near
+    room = job.clearance + extra
     attempt, solved = Attempt(way, method), start
     for _ in range(_TRIES):
         solved = program.solve(solved, job.ends, job.envelope, job.discs, field, weights, room)
         path = as_path(solved.points, job.robot.turning_length)
-        near = path_clearance(
+        found = path_clearance(
             path, job.robot.footprint, job.scene.keep_out, enough=job.clearance - _EXACT
         )
-        if near.bound >= job.clearance - _EXACT:
-            return _timed(job, replace(attempt, path=path, clearance=near)), solved
-        attempt = replace(attempt, why=f"{near}; IPOPT: {solved.status}")
-        room += job.clearance - near.distance + _MORE
+        if found.bound >= job.clearance - _EXACT:
+            return _timed(job, replace(attempt, path=path, clearance=found)), solved
+        attempt = replace(attempt, why=f"{found}; IPOPT: {solved.status}")
+        room += job.clearance - found.distance + _MORE
     return attempt, solved
 
 
-def _extra(job: _Job, field: Field, way: Way) -> float:
-    """m that discs keep beyond the clearance, so that the outline, which they leave gaps of, does:
-    all of the gap, or what the narrowest place allows."""
-    narrow = float(field.at(way.points).min()) + field.spacing / 2
-    return float(
-        np.clip(_TIGHT * (narrow - job.discs.inner[2] - job.clearance), _LEAST, job.discs.gap)
-    )
+def _near(job: _Job, field: Field, way: Way) -> tuple[Field, float]:
+    """The field around a way, finer where it is narrow; and what discs keep beyond the clearance
+    (m), so that the outline, which they leave gaps of, does: all of the gap, or what the narrowest
+    place allows."""
+    near = field.cropped(way.points)
+    slack = near.roomiest(way.points) - job.discs.inner[2] - job.clearance
+    least = max(float(slack.min()), _LEAST)
+    if _ROUNDED * least < near.spacing:
+        tight = way.points[_ROUNDED * slack < near.spacing]
+        reach = 1.5 * float(np.hypot(*np.transpose(job.robot.footprint)).max())
+        near = near.finer(job.scene, _ROUNDED * least, tight, reach)
+    return near, float(np.clip(_TIGHT * least, _LEAST, job.discs.gap))
 
 
 def _timed(job: _Job, attempt: Attempt) -> Attempt:
