@@ -45,7 +45,7 @@ LONGER = 1.15  # times the shortest way: longer ones are not made smooth
 _LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; added to what lacks
 _TIGHT = 0.5  # of the room beside a disc in the narrowest place: what discs may keep there
 _ROUNDED = 1.8  # times that room: spacing of a field whose spline does not round a ridge off
-_TRIES = 5  # times that more room is given
+_TRIES = 4  # times that more room is given
 _HELD = 0.95  # of the speeds of two stages that a program starts from
 _EXACT = 1e-6  # m of clearance that is rounding
 
