@@ -149,9 +149,7 @@ def write_solution(
         "problem_file": solution.problem.source,
         "wall_time_s": solution.wall_time,
         "search_time_s": None if search is None else search.seconds,
-        "files": checksums(
-            place, [*(n for n in _OF_A_SOLUTION if n not in _PICTURES), *stored]
-        ),
+        "files": checksums(place, [*(n for n in _OF_A_SOLUTION if n not in _PICTURES), *stored]),
     }
     write_sealed(place / "summary.json", summary)
     return place

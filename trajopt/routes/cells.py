@@ -1,7 +1,7 @@
 """One cell of a route's program in symbols: cost, rows and discs, with first and second derivatives.
 
 A cell's variables are its four control points and the speeds at its two ends. All rows are scaled so
-that their bound is 1. Imports casadi; see ``program``.
+that their bound is 1. See ``program``.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.arrays import Array, IndexArray
+from trajopt.optimize.symbols import casadi
 from trajopt.routes.envelope import Envelope
 
 CELLS = 5  # to a segment of the spline; unaligned or coarser nodes lose up to 0.2 % of time
@@ -98,8 +99,7 @@ class _End:
 @lru_cache(maxsize=16)
 def symbols_of(kind: Kind, discs: int) -> Symbols:
     """The functions of a kind of cell."""
-    import casadi as ca
-
+    ca = casadi()
     axes, rates = kind.axes, len(kind.norms)
     points = 4 * axes
     z, w = ca.SX.sym("z", points + 2), ca.SX.sym("w", 28)

@@ -13,6 +13,7 @@ from trajopt.arrays import Array
 
 GAP = 1 / 15  # of the largest disc: what discs may leave of the outline; chosen, 2 cm of 0.3 m
 _STEP = 0.25  # of the gap, between places of the outline that discs must reach; chosen
+_CLOSE = 1e-4  # of the longer side: how near the largest disc is to the largest there is; chosen
 _SIDE = 40  # places along the longer side where discs may have their centres; chosen
 
 
@@ -42,9 +43,10 @@ def cover(footprint: Sequence[tuple[float, float]]) -> Cover:
     centres = np.vstack(
         [centres, centres * [1, 0] + [0, middle[1]], centres * [0, 1] + [middle[0], 0]]
     )
+    largest = shapely.maximum_inscribed_circle(shape, tolerance=_CLOSE * float((high - low).max()))
+    centres = np.vstack([shapely.get_coordinates(largest)[:1], centres])
     centres = centres[shapely.contains_xy(shape, centres[:, 0], centres[:, 1])]
-    radii = shapely.distance(shape.exterior, shapely.points(centres))
-    best = int(np.argmax(radii))
+    radii, best = shapely.distance(shape.exterior, shapely.points(centres)), 0
     gap = GAP * float(radii[best])
     along = np.arange(0.0, shape.exterior.length, _STEP * gap)
     edge = shapely.get_coordinates(shape.exterior.interpolate(along))

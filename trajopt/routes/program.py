@@ -6,8 +6,8 @@ by Simpson's rule; the time is the sum of 2 ds / (v_k + v_k+1), accelerations ar
 v^2 / 2 over ds. A cell depends on four control points and two speeds only: ``cells`` holds its cost
 and rows with both derivatives, compiled once and mapped over all cells here. Distances from
 obstacles, with derivatives, come from a ``Field`` at each call, so a program is built once for a
-robot's kinds of rows and a number of points, and solved in any scene. Imports casadi: a general
-optimizer has no words for what is differentiated cell by cell.
+robot's kinds of rows and a number of points, and solved in any scene. A general optimizer
+has no words for what is differentiated cell by cell.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from trajopt.arrays import Array, IndexArray
+from trajopt.optimize.symbols import QUIET, casadi
 from trajopt.routes.bspline import basis_rows
 from trajopt.routes.cells import (
     CELLS,
@@ -37,13 +38,10 @@ from trajopt.routes.field import Field
 _EVEN = 1e-2  # of the cost: weight of the mean square of |q'| less its mean, relative; chosen
 _CRAWL = 1e-3  # m/s, everywhere where speeds are left out
 _SETTINGS = {
-    "print_time": False,
-    "error_on_fail": False,
+    **QUIET,
     "calc_lam_p": False,
     "calc_lam_x": False,
     "no_nlp_grad": True,
-    "ipopt.print_level": 0,
-    "ipopt.sb": "yes",
     "ipopt.mu_init": 1e-2,
     "ipopt.max_iter": 150,
     "ipopt.tol": 1e-4,
@@ -169,8 +167,7 @@ class Program:
 
     def _build(self) -> Any:
         """IPOPT's solver with its functions put together from those of a cell."""
-        import casadi as ca
-
+        ca = casadi()
         s, n, discs = self.symbols, self.cells, self.discs
         x = ca.MX.sym("x", self.size)
         count = [s.shared, 2 * discs, discs, 4]

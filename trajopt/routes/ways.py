@@ -2,7 +2,8 @@
 
 Every cell is joined with its eight neighbours where a disc fits; leaving room costs less than
 grazing. Trees of shortest ways from the start and from the goal meet in every cell: through which
-gaps a way through a cell goes, there and on, tells its class. Two ways are of one class where they pass every
+gaps a way through a cell goes, there and on, tells its class (so a way is found where it is the
+shortest to some cell and on from it). Two ways are of one class where they pass every
 island of blocked cells on the same side, which signed crossings of a ray from each island tell.
 """
 

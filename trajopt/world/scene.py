@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-
 from typing import TYPE_CHECKING
 
 from trajopt.arrays import Array, require_positive
