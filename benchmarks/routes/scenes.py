@@ -129,7 +129,12 @@ def narrow(name: str, spare: float = 0.04) -> Tables:
     half, length = size_of(robot(name))
     x, y = 5 * length, 3 * length
     gap = 2 * half + spare
-    found = _tables(name, f"Narrow passage, {100 * spare:g} cm to spare", [length, length, 0.0], [2 * x - length, length, 0.0])
+    found = _tables(
+        name,
+        f"Narrow passage, {100 * spare:g} cm to spare",
+        [length, length, 0.0],
+        [2 * x - length, length, 0.0],
+    )
     found["space"] = {"x": [0.0, 2 * x], "y": [0.0, 2 * y]}
     thick = 0.8 * length
     found["obstacles"] = [
@@ -181,7 +186,12 @@ def parking(name: str) -> Tables:
     """Into a bay across the lane, between two parked robots; to be driven forwards."""
     half, length = size_of(robot(name))
     bay, lane = 2.6 * half, 5 * length
-    found = _tables(name, "Parking bay", [1.2 * length, 2.2 * length, 0.0], [9 * length, -0.9 * length, -np.pi / 2])
+    found = _tables(
+        name,
+        "Parking bay",
+        [1.2 * length, 2.2 * length, 0.0],
+        [9 * length, -0.9 * length, -np.pi / 2],
+    )
     found["space"] = {"x": [0.0, 12 * length], "y": [-2.0 * length, lane]}
     x = 9 * length
     for k, place in enumerate((x - bay, x + bay)):
