@@ -13,6 +13,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 import trajopt
+from benchmarks import time_scaling_pictures
 from benchmarks.common import PROBLEMS
 from benchmarks.peers import timing_picture
 from benchmarks.theses import (
@@ -256,5 +257,9 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "speeds_figure": lambda: powerbot("speeds"),
     "path_speed_figure": lambda: powerbot("path"),
     "safe_speed_figure": lambda: powerbot_figures.safe_speed_figure(braking=1.5, robot_speed=2.1),
+    "phase": lambda: time_scaling_pictures.phase(time_scaling_pictures.timed(300)),
+    "rows": lambda: time_scaling_pictures.rows(time_scaling_pictures.timed(300)),
+    "grid": time_scaling_pictures.grid,
+    "gap": time_scaling_pictures.gap,
     "growth_figure": lambda: timing_picture.growth_figure({"compiled": ((100, 1000, 10000), (1e-3, 1e-2, 1e-1)), "toppra": ((100, 1000), (1e-2, 0.12))}),
 }  # fmt: skip

@@ -81,14 +81,12 @@ def rows(trajectory: Trajectory) -> Figure:
     axes = figure.add_subplot()
     s, speed = driven(trajectory)
     axes.plot(s, speed, color=GREY, linewidth=0.8)
-    told = set()
-    for stretch in trajectory.active:
-        inside = (s >= stretch.start) & (s <= stretch.end)
-        index = [limit.name for limit in trajectory.limits].index(stretch.limit)
-        colour = limit_colour(stretch.limit, index)
-        label = None if stretch.limit in told else stretch.limit.replace("_", " ")
-        told.add(stretch.limit)
-        axes.plot(s[inside], speed[inside], color=colour, linewidth=3, label=label)
+    for index, limit in enumerate(trajectory.limits):
+        here = [part for part in trajectory.active if part.limit == limit.name]
+        binds = np.any([(s >= part.start) & (s <= part.end) for part in here], axis=0)
+        if here:
+            look = {"color": limit_colour(limit.name, index), "label": limit.name.replace("_", " ")}
+            axes.plot(s, np.where(binds, speed, np.nan), linewidth=3, **look)
     axes.set(xlabel="s (m)", ylabel="s' (m/s)", xlim=(0, ROUTE.length), ylim=(0, 1.6))
     axes.legend(loc="upper right", title="binds", ncols=2)
     return figure
@@ -122,12 +120,12 @@ def gap() -> Figure:
         cells, [one.bound or np.nan for one in found], "o-", color=VERMILION, label="bound"
     )
     times.axhline(best.duration, color=GREY, linewidth=0.8)
-    times.set(xlabel="cells", ylabel="time (s)")
+    times.set(xlabel="cells (–)", ylabel="time (s)")
     times.legend()
     share.loglog(cells, [one.gap or np.nan for one in found], "o-", color=BLUE)
     share.axhline(1e-3, color=GREY, linewidth=0.8)
     share.annotate("asked for", (cells[0], 1e-3), (0, 3), textcoords="offset points", color=GREY)
-    share.set(xlabel="cells", ylabel="gap (share of the time)")
+    share.set(xlabel="cells (–)", ylabel="gap, share of the time (–)")
     return figure
 
 
