@@ -1,8 +1,8 @@
 """Robots of five kinds on slopes and rough ground, in both physics engines, beside their plans.
 
-Run from the repository: ``python -m benchmarks.ground_physics``. Prints three tables: motions
-planned with 80 % of the friction, open and closed loop; motions planned with 120 % of it; and the
-slopes at which robots tip over. ``--robots``, ``--engines``, ``--frictions`` leave some out.
+Run from the repository: ``python -m benchmarks.ground_physics``. Prints four tables: motions
+planned with 80 % of the friction, open and closed loop; motions planned with 120 % of what all wheels
+hold together; the slopes at which robots tip over; and the worst of the first two. ``--robots``, ``--engines``, ``--frictions`` leave some out.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ LOAD = (
     0.1  # of an even share, left on every wheel: PowerBot would brake with its castors in the air
 )
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
+LEFT = "left physics"
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are left out, for
 # on them a robot leans before it tips, which the limit does not know. Castors are blocked, for else PowerBot turns about its lower
 # drive wheel, which alone is loaded, before it tips across.
@@ -179,7 +180,7 @@ def beyond_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequenc
     for name, place, friction in product(names, GROUNDS, frictions):
         trajectory = plan(name, place, friction, BEYOND, "capacity")
         for engine in engines:
-            share, off = "left physics", ""
+            share, off = LEFT, ""
             try:
                 report = driven(trajectory, friction, engine)
                 share = f"{100 * report.slip_share:.1f}"
@@ -204,6 +205,18 @@ def tip_rows(names: Sequence[str], engines: Sequence[str]) -> Rows:
         )
 
 
+def worst_rows(safe: Sequence[tuple[str, ...]], beyond: Sequence[tuple[str, ...]]) -> Rows:
+    """Of all grounds and frictions, for every robot and engine: largest figures of ``safe_rows``,
+    least slip of ``beyond_rows``; a motion that left physics slid."""
+    for name, engine in dict.fromkeys((row[0], row[3]) for row in safe):
+        mine = [row for row in safe if (row[0], row[3]) == (name, engine)]
+        slid = [row[4] for row in beyond if (row[0], row[3]) == (name, engine)]
+        least = min((float(share) for share in slid if share != LEFT), default=math.inf)
+        columns = (5, 6, 7, 9)
+        worst = (max((row[k] for row in mine), key=float) for k in columns)
+        yield name, engine, *worst, f"{least:g}"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--robots", nargs="+", default=list(ROBOTS), choices=list(ROBOTS))
@@ -212,24 +225,31 @@ def main() -> None:
     asked = parser.parse_args()
     cases = (asked.robots, asked.engines, asked.frictions)
     motion = ("robot", "ground", "friction", "engine")
+    safe, beyond = list(safe_rows(*cases)), list(beyond_rows(*cases))
     tables = [
         ResultTable(
             f"Planned with {SAFE:.0%} of the friction, by each robot's own rule",
             (*motion, "duration [s]", "open loop: off [% of way]", "closed loop: off [mm]",
              "slip, open [% of speed]", "slip, closed [%]", "steering off [rad]",
              "loads off [% of weight]"),
-            list(safe_rows(*cases)),
+            safe,
         ),
         ResultTable(
             f"Planned with {BEYOND:.0%} of the friction of all wheels together",
             (*motion, "slip [% of speed]", "off [% of way]"),
-            list(beyond_rows(*cases)),
+            beyond,
         ),
         ResultTable(
             "Slope at which a tall robot tips over",
             ("robot", "centre of gravity [m]", "facing", "model [deg]",
              *(f"{e} [deg]" for e in asked.engines)),
             list(tip_rows(asked.robots, asked.engines)),
+        ),
+        ResultTable(
+            "Worst of all grounds and frictions",
+            ("robot", "engine", "open loop: off [% of way]", "closed loop: off [mm]",
+             "slip [% of speed]", "steering off [rad]", f"slip at {BEYOND:.0%} [%], at least"),
+            list(worst_rows(safe, beyond)),
         ),
     ]  # fmt: skip
     publish("ground_physics", tables, packages=("trajopt", "numpy", *ENGINES))

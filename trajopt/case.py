@@ -21,6 +21,7 @@ from trajopt.problem import Problem, load_problem
 from trajopt.simulate.check import ValidationReport
 from trajopt.solution import Solution
 from trajopt.sweeps.cases import Case
+from trajopt.world.occupancy import parts_of
 
 ENGINES = ("none", "pybullet", "mujoco")
 
@@ -137,9 +138,11 @@ class ProblemRun:
     def content(self) -> Any:
         """The problem in plain values, as identities of cases hold it, with what files of the ground
         hold by their digests."""
-        folder, files = self.problem.folder, self.problem.ground.files
         return self.problem.standalone(
-            {key: sha256((folder / file).read_bytes()).hexdigest() for key, file in files.items()}
+            {
+                key: sha256(b"".join(part.read_bytes() for part in parts_of(file))).hexdigest()
+                for key, file in self.problem.files.items()
+            }
         )
 
     def check(self, case: Case, spare: Collection[str]) -> None:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 # Where no wheel angle counts, every candidate is timed: 5 to 30 ms each. Chosen: within 0.1 % of
 # longer searches on a scenario's space.
 FREELY, FREE_EVALUATIONS = "slsqp", 400
+_REACHES = 2.0  # m around a motion in which maps and borders stand in physics; chosen
 
 
 def solve(
@@ -46,7 +47,7 @@ def solve(
     engine: str = "auto",
 ) -> Solution:
     """Do the job of a problem (``problem.job``): search control points and time the path, time a
-    given path, or what the system of a section does.
+    given path, find a route, or what the system of a section does.
 
     ``optimizer``, ``budget``, ``x0``, ``callback``, ``state`` and ``progress(evaluations,
     best_cost)`` are of the search, as in ``minimize`` (auto: exact solutions first, then the best
@@ -73,6 +74,11 @@ def solve(
         expected = "left out: a given path is not searched"
         _refuse(expected, optimizer=by, budget=budget, x0=x0, callback=callback, state=state)
         found = _timed(problem, problem.flat_path, engine)
+    elif job == "route":
+        by = None if optimizer in ("auto", "ipopt") else optimizer
+        expected = "left out: a route has its own search, by ipopt"
+        _refuse(expected, optimizer=by, budget=budget, x0=x0, callback=callback, state=state)
+        found = _routed(problem, engine)
     else:
         objective = search_objective(problem)
         if optimizer == "auto" and not problem.critical and problem.actuator is None:
@@ -107,17 +113,22 @@ def with_details(solution: Solution) -> Solution:
     return solution
 
 
-def _timed(
-    problem: Problem, path: Path, engine: str, searched: OptimizeResult | None = None
-) -> Solution:
-    """The solution on a path; without a trajectory where no motion keeps the limits."""
-    limits = problem.limits
-    around: dict[str, Any] = {
+def _around(problem: Problem) -> dict[str, Any]:
+    """What timing takes besides a path and limits."""
+    return {
         "robot": problem.robot,
         "ground": problem.scene.ground,
         "start_wheels": problem.start_wheels,
         "start_steering": problem.start_steering,
     }
+
+
+def _timed(
+    problem: Problem, path: Path, engine: str, searched: OptimizeResult | None = None
+) -> Solution:
+    """The solution on a path; without a trajectory where no motion keeps the limits."""
+    limits = problem.limits
+    around = _around(problem)
     try:
         if problem.actuator is not None and searched is not None:
             if engine != "auto":
@@ -140,6 +151,30 @@ def _timed(
     except InfeasibleError as error:
         return Solution(problem, path, None, error, searched)
     return Solution(problem, timed.path, timed, None, searched)
+
+
+def _routed(problem: Problem, engine: str) -> Solution:
+    """The best route found; without a trajectory where none is."""
+    from trajopt.routes.plan import plan_route
+
+    start, goal, timing = problem.start, problem.goal, _around(problem)
+    assert start is not None
+    assert start.pose is not None
+    assert goal is not None
+    route = plan_route(
+        timing.pop("robot"),
+        problem.scene,
+        start.pose,
+        goal.pose,
+        problem.limits,
+        clearance=problem.limits_section.clearance or 0.0,
+        aim=problem.aim,
+        timing={**timing, "engine": engine},
+    )
+    best = route.best
+    if best is None or best.trajectory is None:
+        return Solution(problem, None, None, refused=(route.refused,), route=route)
+    return Solution(problem, best.trajectory.path, best.trajectory, route=route)
 
 
 def validate(
@@ -173,9 +208,11 @@ def validate(
             "where", type(where).__name__, "a Scene, or the Problem that was solved"
         )
     task = where if isinstance(where, Problem) else None
+    scene = where if isinstance(where, Scene) else where.scene
+    places = trajectory.path.position(trajectory.u)[:, :2]
     return check(
         trajectory,
-        where if isinstance(where, Scene) else where.scene,
+        scene.around(places, _REACHES),
         engine=engine,
         picture=picture,
         control=control,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path as FilePath
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -22,8 +22,13 @@ from trajopt.shown import Shown
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.crossing import Standing, crossings
 
+if TYPE_CHECKING:
+    from trajopt.routes.plan import Route
+    from trajopt.world.clearance import Clearance
+
 SearchObjective = TerminalObjective | DurationObjective | ClearObjective
 MARGIN = -1e-9  # least relative margin of a trajectory that keeps its limits
+CLEARANCE = 1e-6  # m of clearance that is rounding
 
 
 class Details(Protocol):
@@ -51,7 +56,7 @@ class Solution(Shown):
     ``trajectory`` is None where no motion keeps the limits (``infeasible`` says which fails where)
     or there is no path (``refused`` says why). ``search`` is that of the control points, where they
     were searched. ``alternatives`` are other solutions, best first; ``details`` is what the system
-    of a section of its own adds.
+    of a section of its own adds. ``route`` holds the ways that were tried, where one was searched.
     """
 
     problem: Problem
@@ -62,6 +67,7 @@ class Solution(Shown):
     refused: tuple[str, ...] = ()
     alternatives: tuple[Solution, ...] = ()
     details: Details | None = None
+    route: Route | None = None
     wall_time: float = field(default=0.0, compare=False)
 
     def __repr__(self) -> str:
@@ -78,13 +84,17 @@ class Solution(Shown):
     @cached_property
     def terms(self) -> dict[str, float]:
         """Terms of the cost by name, without grid error."""
+        if self.problem.job.name == "route" and self.path is not None:
+            return {"duration": self.duration, "length": self.path.length}
         if self.search is None:
             return {"duration": self.duration}
         return self.objective.terms(self.search.x)
 
     @property
     def cost(self) -> float:
-        """Of the search; else the duration, s."""
+        """Of the search; of a route what it was chosen by; else the duration, s."""
+        if self.problem.job.name == "route" and self.problem.aim == "length":
+            return float("nan") if self.path is None else self.path.length
         return self.duration if self.search is None else self.search.fun
 
     @property
@@ -133,10 +143,17 @@ class Solution(Shown):
         return pose, self.problem.start_wheels + turned
 
     @property
+    def _reaches(self) -> bool:
+        """Whether there is a motion to the goal."""
+        return self.search is not None or (
+            self.problem.job.name == "route" and self.trajectory is not None
+        )
+
+    @property
     def deviation(self) -> Array:
         """(3,): final x, y (m), yaw (rad) less the goal's; (0,) where nothing was searched."""
         goal = self.problem.goal
-        if goal is None or self.search is None:
+        if goal is None or not self._reaches:
             return np.zeros(0)
         error = self._final[0] - np.array(goal.pose)
         return np.array([*error[:2], fold(error[2])])
@@ -195,10 +212,26 @@ class Solution(Shown):
             more = [name for name in ("p1", "p2", "heading") if name not in spline.free]
             advice = "; more room to choose: spline.free with " + ", ".join(more) if more else ""
         robot, scene = self.problem.robot, self.problem.scene
+        keeps = self.problem.limits_section.clearance
+        if keeps is not None or scene.map is not None or scene.space is not None:
+            near = self.clearance
+            if near is None or near.distance >= (keeps or 0.0) - CLEARANCE:
+                return []
+            return [str(near) + (f"; limits.clearance is {keeps:g} m" if keeps else "")]
         return [
             f"{crossing}{advice}"
             for crossing in crossings(self.path, robot.footprint, scene.obstacles)
         ]
+
+    @cached_property
+    def clearance(self) -> Clearance | None:
+        """How near the outline comes to what it keeps out of, along the whole path; None without a
+        path."""
+        if self.path is None:
+            return None
+        from trajopt.world.clearance import path_clearance
+
+        return path_clearance(self.path, self.problem.robot.footprint, self.problem.scene.keep_out)
 
     @property
     def holds(self) -> bool:
@@ -209,6 +242,8 @@ class Solution(Shown):
     def status(self) -> str:
         """One sentence: how it was found, and what does not hold."""
         found = "timed" if self.search is None else self.search.message
+        if self.route is not None and self.route.best is not None:
+            found = str(self.route)
         known = self.problem.infeasible
         expected = [f"as the problem says: {known}"] if known and self.faults else []
         return " | ".join([found, *filter(None, ["; ".join(self.faults)]), *expected])

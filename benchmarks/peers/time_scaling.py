@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import OUT, ResultTable, publish
+from benchmarks.peers.time_scaling_calls import calls, cold
 from benchmarks.peers.time_scaling_cases import (
     ACCELERATION,
     SPEED,
@@ -56,10 +57,18 @@ def main() -> None:
     parser.add_argument(
         "--quick", action="store_true", help="fewer repetitions, at most 10,000 points"
     )
-    quick = parser.parse_args().quick
+    parser.add_argument("--calls", action="store_true", help="whole calls and new processes alone")
+    options = parser.parse_args()
+    quick = options.quick
     repetitions = 20 if quick else 200
+    waited = [calls(10 if quick else 60), cold(10 if quick else 50)]
+    if options.calls:
+        for table in waited:
+            print(table.title, *(" | ".join(entries) for entries in table.rows), sep="\n")
+        return
     grown, note = growth(quick)
     tables = [
+        *waited,
         with_forces(repetitions),
         coordinates(repetitions),
         batch(1 if quick else 3),

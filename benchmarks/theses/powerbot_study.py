@@ -116,9 +116,13 @@ def problem(number: int) -> Problem:
     return load_problem(PROBLEMS / "powerbot" / f"experiment_{number}.toml")
 
 
+# Physical limits with the slip formula of the thesis, which leaves the yaw moment out
+OWN = {"limits.variant": None, "limits.slip_rule": "load"}
+
+
 def timed(task: Problem, variant: str, engine: str = "auto") -> Trajectory:
     """The path of a problem, timed."""
-    limits = task.replace({"limits.variant": variant if variant == "thesis" else None}).limits
+    limits = task.replace({"limits.variant": "thesis"} if variant == "thesis" else OWN).limits
     return time_scale(task.path, limits, robot=task.robot, ground=task.scene.ground, engine=engine)
 
 

@@ -183,7 +183,7 @@ def refinements(numbers: Sequence[int]) -> ResultTable:
         found = optimize_path(
             lambda z, level=level, ramps=ramps: lay_over(level(z), ramps) if ramps else level(z),
             np.tile([-CORRIDOR, CORRIDOR], (count, 1)),
-            task.replace({"limits.variant": None}).limits,
+            task.replace({"limits.variant": None, "limits.slip_rule": "load"}).limits,
             robot=task.robot,
             ground=task.scene.ground,
             steps=6,

@@ -14,6 +14,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+from PIL import Image
 from pydantic import BaseModel
 from smdw_problems import ROOT
 
@@ -41,6 +42,8 @@ STRAIGHT: dict[str, Any] = {
         {"name": "wall", "kind": "wall", "height": 1.0, "start": [1.0, 0.3], "end": [1.5, 1.0],
          "thickness": 0.1},
         {"name": "post", "kind": "circle", "height": 1.0, "centre": [0.5, -0.3], "radius": 0.1},
+        {"name": "leaf", "kind": "door", "height": 1.0, "hinge": [0.5, 1.0], "direction": -1.6,
+         "angle": 0.1, "width": 0.8, "thickness": 0.05},
         {"name": "box", "kind": "polygon", "height": 1.0,
          "corners": [[2.2, -0.5], [2.6, -0.5], [2.6, -0.2], [2.2, -0.2]]},
     ],
@@ -87,9 +90,24 @@ def bases() -> dict[str, Problem]:
         ),
         "ramp": load_problem(PROBLEMS / "powerbot" / "experiment_4.toml"),
         "encounters": load_problem(PROBLEMS / "powerbot" / "experiment_3.toml"),
+        "cells": on_ground(straight, friction=0.3).replace({"map.file": "free.yaml"}),
+        "yard": on_ground(straight, friction=0.3).replace({"space": YARD}),
+        "grey": on_ground(straight, friction=0.3).replace({"map.file": "grey.yaml"}),
+        "ring": on_ground(straight, friction=0.3).replace({"obstacles": [RING]}),
+        "shapes": on_ground(straight, friction=0.3).replace({"obstacles": [SHAPES]}),
     }
 
 
+YARD = {
+    "corners": [[-2.0, -2.0], [4.0, -2.0], [4.0, 2.0], [-2.0, 2.0]],
+    "holes": [[[0.5, 1.0], [1.0, 1.0], [1.0, 1.5]]],
+}
+RING = {
+    "name": "ring", "kind": "polygon", "height": 1.0,
+    "corners": [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]],
+    "holes": [[[-3.0, -3.0], [4.0, -3.0], [4.0, 3.0], [-3.0, 3.0]]],
+}  # fmt: skip
+SHAPES = {"name": "shelves", "kind": "polygon", "height": 1.0, "file": "far.csv"}
 HILLY = {"friction": 0.3, "grade": 1.0}
 
 
@@ -106,6 +124,14 @@ def folder() -> Path:
                 at = [(i + a, j + b) for a, b in corners]
                 lines += [f"vertex {x[c]} {y[c]} {height[c]}" for c in at]
         (place / f"{name}.stl").write_text("\n".join(lines), encoding="utf-8")
+    for name, grey in (("free", 254), ("grey", 205)):
+        Image.fromarray(np.full((40, 60), grey, dtype=np.uint8)).save(place / f"{name}.pgm")
+        keys = f"image: {name}.pgm\nresolution: 0.1\norigin: [-2.0, -2.0, 0.0]\nnegate: 0\n"
+        keys += "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+        (place / f"{name}.yaml").write_text(keys, encoding="utf-8")
+    for name, x in (("far", 9), ("near", 1)):
+        rows = [f"1,{x + i},{j}" for i, j in ((0, 0), (1, 0), (1, 1))]
+        (place / f"{name}.csv").write_text("\n".join(["polygon,x,y", *rows]), encoding="utf-8")
     np.save(place / "spots.npy", 0.02 + 0.02 * np.abs(np.cos(x)) + 0.01 * (y + 2))
     return place
 
@@ -210,6 +236,14 @@ ROWS = {
     "obstacles.wall.start": Row("path", [1.0, 0.2], told),
     "obstacles.wall.end": Row("path", [1.2, 1.0], told),
     "obstacles.wall.thickness": Row("path", 0.2, told),
+    "obstacles.door.name": Row("path", "gate", picture, "obstacles.leaf.name"),
+    "obstacles.door.kind": Row("path", "gap", "obstacles", "obstacles.leaf.kind"),
+    "obstacles.door.height": Row("path", 2.0, picture, "obstacles.leaf.height"),
+    "obstacles.door.hinge": Row("path", [0.6, 1.0], told, "obstacles.leaf.hinge"),
+    "obstacles.door.direction": Row("path", -1.3, told, "obstacles.leaf.direction"),
+    "obstacles.door.angle": Row("path", -0.3, told, "obstacles.leaf.angle"),
+    "obstacles.door.width": Row("path", 0.7, told, "obstacles.leaf.width"),
+    "obstacles.door.thickness": Row("path", 0.2, told, "obstacles.leaf.thickness"),
     "obstacles.circle.name": Row("path", "tree", told, "obstacles.post.name"),
     "obstacles.circle.kind": Row("path", "ball", "obstacles", "obstacles.post.kind"),
     "obstacles.circle.height": Row("path", 2.0, picture, "obstacles.post.height"),
@@ -221,6 +255,11 @@ ROWS = {
     "obstacles.polygon.corners": Row(
         "path", [[2.1, -0.5], [2.6, -0.5], [2.6, -0.2]], told, "obstacles.box.corners"
     ),
+    "obstacles.polygon.holes": Row("ring", [], told, "obstacles.ring.holes"),
+    "obstacles.polygon.file": Row("shapes", "near.csv", told, "obstacles.shelves.file"),
+    "map.file": Row("cells", "grey.yaml", told),
+    "map.unknown": Row("grey", "free", told),
+    "limits.clearance": Row("yard", 2.0, told),
     "limits.speed": Row("path", 0.5, motion),
     "limits.safety_speed": Row("path", 0.5, motion),
     "limits.yaw_rate": Row("path", 0.05, motion),
@@ -234,7 +273,7 @@ ROWS = {
     "limits.power": Row("path", 20.0, motion),
     "limits.slip": Row("path", False, margins),
     "limits.slip_share": Row("path", 0.1, motion),
-    "limits.slip_rule": Row("path", "load", motion),
+    "limits.slip_rule": Row("icy", "load", motion),
     "limits.acceleration": Row("path", 0.3, motion),
     "limits.deceleration": Row("path", 0.3, motion),
     "limits.tip": Row("path", False, margins),
@@ -248,6 +287,8 @@ ROWS = {
     "goal.critical": Row("search", ["front-right"], motion),
     "space.x": Row("search", [0.0, 2.5], told),
     "space.y": Row("search", [-0.5, 1.0], told),
+    "space.corners": Row("yard", [[-2.0, -2.0], [4.0, -2.0], [1.0, 2.0]], told),
+    "space.holes": Row("yard", [[[0.5, -1.0], [1.0, -1.0], [1.0, 1.5]]], told),
     "spline.free": Row("search", ["p1", "p2"], motion),
     "objective.kind": Row("search", "energy", cost),
     "objective.pose_gains": Row("drives", [1.0, 1.0, 1.0], cost),

@@ -85,10 +85,13 @@ def _experiment(number: int) -> Problem:
     return load_problem(ROOT / "problems" / "powerbot" / f"experiment_{number}.toml")
 
 
+OWN = {"limits.variant": None, "limits.slip_rule": "load"}
+
+
 def _timed(task: Problem, variant: Literal["thesis", "physical"], engine: str) -> Trajectory:
     return time_scale(
         task.path,
-        task.replace({"limits.variant": None if variant == "physical" else variant}).limits,
+        task.replace(OWN if variant == "physical" else {"limits.variant": variant}).limits,
         robot=task.robot,
         ground=task.scene.ground,
         engine=engine,

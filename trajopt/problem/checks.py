@@ -29,6 +29,14 @@ def check(problem: Problem) -> None:
         _search(problem)
     if problem.job.name == "path":
         _path(problem)
+    if problem.job.name == "route":
+        _route(problem)
+    if problem.space is not None and problem.space.corners is not None and problem.area is None:
+        expected = f"x and y: for the job '{problem.job.name}' it is a rectangle"
+        raise broken_rule("space.corners", "given", expected)
+    if problem.limits_section.clearance is not None and problem.job.name not in ("route", "path"):
+        expected = f"none: the job '{problem.job.name}' keeps no distance"
+        raise broken_rule("limits.clearance", problem.limits_section.clearance, expected)
     for section in problem.given & set(SECTIONS):
         if hasattr(entry(section), "check"):
             entry(section).check(problem)
@@ -80,7 +88,7 @@ def _ground(problem: Problem) -> None:
     ):
         if along and problem.job.name != "path":
             raise broken_rule(key, "given", "none: its places are those of a given [path]")
-    if problem.job.name != "path" and not problem.scene.ground.level:
+    if problem.job.name not in ("path", "route") and not problem.scene.ground.level:
         expected = (
             "none: what is searched has a heading of its own, and its wheel angles need level "
             "ground; a given [path] can be driven there"
@@ -108,6 +116,9 @@ def _search(problem: Problem) -> None:
     if math.dist(task.start[:2], task.goal[:2]) < 1e-6:
         raise broken_rule("goal.pose", list(task.goal), "a position different from start.pose")
     kind = problem.objective.kind
+    if kind == "length":
+        expected = "another: the length is a route's, without [spline]"
+        raise broken_rule("objective.kind", kind, expected)
     if kind == "terminal" and not problem.critical and problem.actuator is None:
         expected = (
             '"duration": without goal.critical every path ends at the goal, and the terminal '
@@ -126,6 +137,27 @@ def _search(problem: Problem) -> None:
             "whatever the duration, and time scaling chooses it"
         )
         raise broken_rule("spline.free", list(task.free), expected)
+
+
+def _route(problem: Problem) -> None:
+    start, goal = problem.start, problem.goal
+    assert start is not None
+    assert goal is not None
+    if start.pose is None:
+        raise broken_rule("start.pose", None, "x, y, yaw of the start")
+    if goal.wheels is not None:
+        expected = "none: a route ends at a pose; add [spline] and [space] for a searched spline"
+        raise broken_rule("goal.wheels", list(goal.wheels), expected)
+    if math.dist(start.pose[:2], goal.pose[:2]) < 1e-6:
+        raise broken_rule("goal.pose", list(goal.pose), "a position different from start.pose")
+    section = problem.objective
+    if "objective" in problem.given:
+        if section.kind not in ("duration", "length"):
+            expected = '"duration" or "length" for a route'
+            raise broken_rule("objective.kind", section.kind, expected)
+        for key in section.model_fields_set - {"kind"}:
+            expected = "none for a route: it ends at the goal"
+            raise broken_rule(f"objective.{key}", getattr(section, key), expected)
 
 
 def _path(problem: Problem) -> None:

@@ -37,7 +37,13 @@ JOBS = (
         "path",
         "times a given path",
         frozenset({"path"}),
-        frozenset({"start", "profile", "encounters", "printed"}),
+        frozenset({"start", "profile", "encounters", "printed", "map", "space"}),
+    ),
+    Job(
+        "route",
+        "finds a way from start to goal among what stands there",
+        frozenset({"start", "goal"}),
+        frozenset({"map", "space", "objective"}),
     ),
     Job("climb", "plans how to get over a step", frozenset({"start", "climb", "space"})),
 )

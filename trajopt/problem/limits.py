@@ -85,6 +85,9 @@ class LimitsSection(Section):
         ge=0,
         lt=1,
     )
+    clearance: Positive | None = Field(
+        None, description="least distance of the outline from what it keeps out of, m; absent: none"
+    )
     variant: str | None = Field(
         None, description="other formulas for slip and tip, by name: thesis (004)"
     )

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path as FilePath
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -28,7 +28,7 @@ from trajopt.problem.ground import GroundSection, least
 from trajopt.problem.jobs import Job, job_of
 from trajopt.problem.limits import LimitsSection
 from trajopt.problem.robot import RobotSection, robot_of, robot_tables
-from trajopt.problem.surroundings import ObstacleSection
+from trajopt.problem.surroundings import MapSection, ObstacleSection, PolygonSection
 from trajopt.problem.task import ActuatorSection, Goal, ObjectiveSection, Space, Spline, Start
 from trajopt.robots.robot import Robot
 from trajopt.schema import (
@@ -43,6 +43,11 @@ from trajopt.schema import (
 from trajopt.shown import Shown
 from trajopt.world.laid import lay
 from trajopt.world.scene import Scene
+
+if TYPE_CHECKING:
+    import shapely
+
+Aim = Literal["duration", "length"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +77,7 @@ class Problem(Section, Shown):
     robot_section: RobotSection = Field(alias="robot")
     ground: GroundSection
     obstacles: tuple[ObstacleSection, ...] = ()
+    map: MapSection | None = None
     limits_section: LimitsSection = Field(alias="limits")
     start: Start | None = None
     goal: Goal | None = None
@@ -132,12 +138,39 @@ class Problem(Section, Shown):
     @cached_property
     def scene(self) -> Scene:
         """Where it moves."""
-        standing = tuple(section.obstacle for section in self.obstacles)
+        standing = tuple(o for part in self.obstacles for o in part.obstacles(self.folder))
         friction, ground = self.friction, self.ground.shape(self.folder)
+        cells = None
+        if self.map is not None and self.map.cells:
+            cells = self.map.occupancy(self.folder)
         try:
-            return Scene(least(friction), ground, standing, not isinstance(friction, float))
+            return Scene(
+                least(friction), ground, standing, not isinstance(friction, float), cells, self.area
+            )
         except ArgumentError as error:
             raise broken_rule("obstacles.name", error.value, error.expected) from None
+
+    @cached_property
+    def area(self) -> shapely.Polygon | None:
+        """Where the outline stays on a route or a given path; None where nothing says so."""
+        if self.job.name not in ("route", "path"):
+            return None
+        found = None if self.space is None else self.space.area
+        if self.map is None or self.map.cells:
+            return found
+        area = self.map.area(self.folder)
+        if found is None:
+            return area
+        both = area.intersection(found)
+        if both.geom_type != "Polygon" or both.is_empty:
+            expected = "one polygon in common with [map]"
+            raise broken_rule("space", f"a {both.geom_type} in common", expected)
+        return both
+
+    @cached_property
+    def aim(self) -> Aim:
+        """What a route is chosen by."""
+        return "length" if self.objective.kind == "length" else "duration"
 
     @cached_property
     def friction(self) -> Friction:
@@ -204,16 +237,26 @@ class Problem(Section, Shown):
     def tables(self) -> dict[str, Any]:
         """The tables of its file."""
         tables = self.model_dump(mode="json", exclude_none=True, by_alias=True)
-        if self.job.name != "search":
+        if "objective" not in self.model_fields_set:
             del tables["objective"]
         return tables
 
-    def standalone(self, ground_files: Mapping[str, str] | None = None) -> dict[str, Any]:
-        """The tables of a file that needs no other file of the user's, but for the ground's:
-        ``ground_files`` are new names of these, by the key of their table."""
+    @property
+    def files(self) -> dict[str, FilePath]:
+        """Files that it names, but for those of robot and path, by the dotted key of their table."""
+        found = {f"ground.{key}": file for key, file in self.ground.files.items()}
+        found |= {"map": self.map.file} if self.map is not None else {}
+        for i, section in enumerate(self.obstacles):
+            if isinstance(section, PolygonSection) and section.file is not None:
+                found[f"obstacles.{i}"] = section.file
+        return {key: self.folder / file for key, file in found.items()}
+
+    def standalone(self, names: Mapping[str, str] | None = None) -> dict[str, Any]:
+        """The tables of a file that needs no other file of the user's, but for ``files``: ``names``
+        are new ones of these, by the key of their table."""
         tables = self.tables()
-        for key, file in (ground_files or {}).items():
-            tables["ground"][key]["file"] = file
+        for key, file in (names or {}).items():
+            set_key(tables, f"{key}.file", file, self.source)
         if self.robot_section.file is not None:
             tables["robot"] = robot_tables(tables["robot"], self.folder)
         if self.path_section is not None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, Self
+from typing import TYPE_CHECKING, Literal, Self
 
 from pydantic import Field, model_validator
 
+from trajopt.problem.surroundings import polygon
 from trajopt.robots.actuator import Actuator
 from trajopt.schema import NonNegative, Point, Point3, Positive, Section, broken_rule
+
+if TYPE_CHECKING:
+    import shapely
 
 FreeVariable = Literal["p1", "p2", "heading", "duration"]
 
@@ -53,19 +57,61 @@ class Goal(Section):
 
 
 class Space(Section):
-    """A rectangle: searched control points stay inside; so does the outline where a step is
-    climbed."""
+    """A rectangle: searched control points stay inside; so does the outline where a step is climbed.
+    On a route, or along a given path, the outline stays inside, and it may be a polygon."""
 
-    x: Point = Field(description="from, to, m")
-    y: Point = Field(description="from, to, m")
+    x_range: Point | None = Field(None, alias="x", description="from, to, m")
+    y_range: Point | None = Field(None, alias="y", description="from, to, m")
+    corners: tuple[Point, ...] | None = Field(
+        None, description="instead of x and y: x, y, m, counter-clockwise", min_length=3
+    )
+    holes: tuple[tuple[Point, ...], ...] = Field(
+        (), description="polygons inside that outlines keep out of, with corners"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        for axis in ("x", "y"):
+        given = self.x_range is not None, self.y_range is not None
+        if self.corners is not None:
+            if any(given):
+                expected = "corners, or x and y, not both"
+                raise broken_rule("x" if given[0] else "y", "given", expected)
+            _ = polygon("corners", self.corners, self.holes)
+            return self
+        for axis, there in zip(("x", "y"), given, strict=True):
+            if not there:
+                raise broken_rule(axis, "missing", "an interval [from, to], or corners instead")
             low, high = getattr(self, axis)
             if not low < high:
                 raise broken_rule(axis, [low, high], "an interval [from, to] with from < to")
+        if self.holes:
+            raise broken_rule("holes", "given", "corners with them")
         return self
+
+    @property
+    def x(self) -> Point:
+        """From, to, m; of a polygon, as far as it reaches."""
+        if self.x_range is not None:
+            return self.x_range
+        low, _, high, _ = self.area.bounds
+        return low, high
+
+    @property
+    def y(self) -> Point:
+        """As ``x``."""
+        if self.y_range is not None:
+            return self.y_range
+        _, low, _, high = self.area.bounds
+        return low, high
+
+    @property
+    def area(self) -> shapely.Polygon:
+        """The polygon, or the rectangle as one."""
+        if self.corners is not None:
+            return polygon("corners", self.corners, self.holes)
+        from shapely.geometry import box
+
+        return box(self.x[0], self.y[0], self.x[1], self.y[1])
 
     def contains(self, x: float, y: float) -> bool:
         return self.x[0] <= x <= self.x[1] and self.y[0] <= y <= self.y[1]
@@ -88,9 +134,10 @@ class Spline(Section):
 
 class ObjectiveSection(Section):
     """Terminal cost of [guzman2015], Table 4.4, or duration (s) or energy (J, of the motors) of the
-    fastest motion along the path."""
+    fastest motion along the path; of a route, its duration, or its length (m) with little
+    bending."""
 
-    kind: Literal["terminal", "duration", "energy"] = "terminal"
+    kind: Literal["terminal", "duration", "energy", "length"] = "terminal"
     pose_gains: tuple[NonNegative, NonNegative, NonNegative] = Field(
         (3.0, 0.125, 2.5), description="on |dx|, |dy| (1/m), |dyaw| (1/rad): Table 5.8"
     )
@@ -108,7 +155,7 @@ class ObjectiveSection(Section):
     @property
     def unit(self) -> str:
         """Of the cost, with a space before it; "" for the terminal one, which has none."""
-        return {"terminal": "", "duration": " s", "energy": " J"}[self.kind]
+        return {"terminal": "", "duration": " s", "energy": " J", "length": " m"}[self.kind]
 
     @property
     def period(self) -> float:

@@ -21,6 +21,7 @@ from trajopt.report.ground_plan import (
     near_points,
     outline,
 )
+from trajopt.report.route_picture import draw_borders, draw_route
 from trajopt.report.style import (
     BLACK,
     BLUE,
@@ -58,13 +59,17 @@ def path_figure(solution: Solution, path: Path) -> Figure:
     if solution.search is not None:
         _draw_explored(axes, solution, solution.search, seen)
     draw_scene(axes, problem.scene, seen)
+    draw_borders(axes, problem.scene)
+    if problem.job.name == "route":
+        draw_route(axes, solution, poses)
     for pose in poses[np.linspace(0, len(poses) - 1, _MOMENTS + 2).round().astype(int)[1:-1]]:
         draw_robot(axes, robot, pose, zorder=2.2)
     draw_robot(axes, robot, poses[0], GREEN, strong=True, label="start", zorder=2.4)
     draw_robot(axes, robot, goal, VERMILION, strong=True, label="goal", zorder=2.4)
     axes.plot(poses[:, 0], poses[:, 1], color=BLUE, linewidth=2.0, zorder=2.6, label="path")
     _draw_crossings(axes, solution, path)
-    _draw_control_points(axes, solution)
+    if problem.job.name != "route":
+        _draw_control_points(axes, solution)
     frame_points(axes, seen)
     axes.set_title(_title(solution))
     figure.legend(loc="outside lower center", ncols=4)

@@ -21,9 +21,11 @@ from trajopt.files import DamageError, checksums, read_table, require_unchanged,
 from trajopt.objectives.terminal import swarm_engine, terminal_objective
 from trajopt.optimize.base import History, OptimizeResult, Status
 from trajopt.paths.path import Path
+from trajopt.paths.spline import SplineBasis
 from trajopt.pipeline import with_details
 from trajopt.problem import Problem, load_problem
 from trajopt.problem.ground import FILES
+from trajopt.problem.surroundings import MAPS
 from trajopt.provenance import commit, run_facts, versions
 from trajopt.report.files import (
     FORMAT,
@@ -52,6 +54,7 @@ from trajopt.timing.cells import Measure
 from trajopt.timing.profile import Profile
 from trajopt.timing.track import Track
 from trajopt.timing.trajectory import Trajectory
+from trajopt.world.occupancy import stored as map_files
 
 if TYPE_CHECKING:
     from trajopt.simulate.check import ValidationReport
@@ -74,6 +77,7 @@ _OF_A_SOLUTION = (
     "timing.csv",
     "history.csv",
     "explored.npz",
+    "route.csv",
     *_PICTURES,
 )
 _SIGMA = ("sigma_dot_squared_m2_s2", "sigma_ddot_first_m_s2", "sigma_ddot_last_m_s2")
@@ -82,6 +86,7 @@ _TABLES = {  # columns that are read back, and those of them that may hold gaps
         ("u", "s_m", "s_dot_m_s", "s_ddot_m_s2", *_SIGMA),
         ("s_ddot_m_s2", *_SIGMA),
     ),
+    "route.csv": (("u", "x_m", "y_m", "yaw_rad"), ("u", "yaw_rad")),
     "history.csv": (("evaluations", "cost", "violation", "seconds_s"), ("cost", "violation")),
 }
 
@@ -105,19 +110,20 @@ def write_solution(
     """
     place, search, problem = made_folder(folder), solution.search, solution.problem
     strange = [name for name in _OF_A_SOLUTION if (place / name).exists()]
-    strange += [path.name for key in FILES for path in place.glob(f"{key}.*")]
+    strange += _copies(place)
     if strange and "summary.json" not in strange:
         expected = f"a folder without {', '.join(strange)}: no run that ended wrote this"
         raise ArgumentError("folder", str(folder), expected)
     # Read first: the problem's file may stand in this folder itself.
-    ground = {key: problem.folder / file for key, file in problem.ground.files.items()}
-    stored = {key: (f"{key}{file.suffix}", file.read_bytes()) for key, file in ground.items()}
-    earlier = [path.name for key in FILES for path in place.glob(f"{key}.*")]
-    for name in (*_OF_A_SOLUTION, *_OF_A_CHECK, *earlier):
+    names, stored = {}, {}
+    for key, file in problem.files.items():
+        names[key] = key.removeprefix("ground.").replace(".", "_") + file.suffix
+        cells = key == "map" and file.suffix in MAPS
+        stored |= map_files(file, names[key]) if cells else {names[key]: file.read_bytes()}
+    for name in (*_OF_A_SOLUTION, *_OF_A_CHECK, *_copies(place)):
         (place / name).unlink(missing_ok=True)  # nothing of an earlier run may pass for this one's
-    for name, content in stored.values():
+    for name, content in stored.items():
         write_bytes(place / name, content)
-    names = {key: name for key, (name, _) in stored.items()}
     write_text(place / "problem.toml", as_toml(problem.standalone(names)))
     if solution.trajectory is not None:
         write_table(place / "trajectory.csv", trajectory_table(solution.trajectory))
@@ -125,6 +131,8 @@ def write_solution(
     if search is not None:
         write_table(place / "history.csv", _history_table(search.history))
         _write_samples(search.history.samples, place / "explored.npz")
+    if problem.job.name == "route" and solution.path is not None:
+        write_table(place / "route.csv", _route_table(solution.path))
     if solution.details is not None:
         solution.details.save(place, pictures=pictures)
     if pictures:
@@ -141,12 +149,16 @@ def write_solution(
         "problem_file": solution.problem.source,
         "wall_time_s": solution.wall_time,
         "search_time_s": None if search is None else search.seconds,
-        "files": checksums(
-            place, [*(n for n in _OF_A_SOLUTION if n not in _PICTURES), *names.values()]
-        ),
+        "files": checksums(place, [*(n for n in _OF_A_SOLUTION if n not in _PICTURES), *stored]),
     }
     write_sealed(place / "summary.json", summary)
     return place
+
+
+def _copies(place: FilePath) -> list[str]:
+    """Names of files in a folder that copies of a problem's files have."""
+    patterns = [f"{key}.*" for key in FILES] + ["map.*", "map_picture.*", "obstacles_*.*"]
+    return [path.name for pattern in patterns for path in place.glob(pattern)]
 
 
 def solution_summary(solution: Solution, *, seed: int) -> dict[str, Any]:
@@ -248,6 +260,8 @@ def read_solution(folder: str | FilePath) -> Solution:
             path = problem.flat_path if timing is None else problem.path
         if search is not None:
             path = terminal_objective(problem).path(search.x)
+        if problem.job.name == "route" and (place / "route.csv").exists():
+            path = _route_path(place, problem)
         trajectory = None
         if timing is not None and path is not None:
             trajectory = _trajectory(place, path, problem, timing)
@@ -387,6 +401,29 @@ def _trajectory(
         problem.start_steering,
         profile,
         timing["least_time_s"],
+    )
+
+
+def _route_table(path: Path) -> dict[str, Any]:
+    """Values at the knots, then the rates at start and goal, which have no knot."""
+    knots = np.asarray(path.basis.knots)
+    yaw = np.full(len(path.coordinates), np.nan) if path.heading is None else path.heading
+    return {
+        "u": np.concatenate([knots, [np.nan, np.nan]]),
+        "x_m": path.coordinates[:, 0],
+        "y_m": path.coordinates[:, 1],
+        "yaw_rad": yaw,
+    }
+
+
+def _route_path(place: FilePath, problem: Problem) -> Path:
+    table = read_table(place / "route.csv", *_TABLES["route.csv"])
+    knots, yaw = table["u"][:-2], table["yaw_rad"]
+    return Path(
+        SplineBasis(tuple(knots.tolist()), clamped_start=True, clamped_end=True),
+        np.column_stack([table["x_m"], table["y_m"]]),
+        None if np.isnan(yaw).any() else yaw,
+        problem.robot.turning_length,
     )
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -62,6 +62,11 @@ class Block:
     def rows(self) -> int:
         return len(self.a) + self.moving
 
+    @cached_property
+    def across(self) -> tuple[Array, Array]:
+        """a and b with their rows as columns, (4, M) and (7, M)."""
+        return np.ascontiguousarray(self.a.T), np.ascontiguousarray(self.b.T)
+
 
 @dataclass(frozen=True, eq=False)
 class Planar:
@@ -99,7 +104,7 @@ class Planar:
         shape = (len(at), sum(block.rows for block in self.blocks))
         # One block: the allocator keeps it for the next call, several of its size it gives back.
         a, b, c = np.empty((3, *shape))
-        first, columns, matrices = 0, list[IndexArray](), list[Block]()
+        first = 0
         for limit, block in zip(self.limits, self.blocks, strict=True):
             if block.moving:
                 assert self.robot is not None
@@ -115,12 +120,8 @@ class Planar:
                 elif isinstance(limit, Tip):
                     kernels.tip_rows(at, arms, cog, limit.reserve, _SMALLEST, first, a, b, c, g)
             elif len(block.a):
-                columns.append(np.arange(first, first + len(block.a)))
-                matrices.append(block)
+                kernels.linear(at, *block.across, block.c, first, a, b, c)
             first += block.rows
-        if matrices:
-            ma, mb, mc = (np.concatenate([getattr(m, k) for m in matrices]) for k in "abc")
-            kernels.linear(at, ma, mb, mc, np.concatenate(columns), a, b, c)
         return a, b, c
 
     def _arms(self, track: Track, measure: Measure, spots: Spots, at: Array) -> Array | None:

@@ -62,22 +62,23 @@ def features(knots: Array, cubics: Array, length: float, free: bool, u: Array) -
 
 @kernel(nogil=True)
 def linear(
-    at: Array, ma: Array, mb: Array, mc: Array, columns: IndexArray, a: Array, b: Array, c: Array
+    at: Array, ma: Array, mb: Array, mc: Array, first: int, a: Array, b: Array, c: Array
 ) -> None:
-    """Rows of constant matrices (M, 4), (M, 7), (M,) in columns (M,) of a, b, c (P, R)."""
+    """Rows of constant matrices (4, M), (7, M), (M,) in columns of a, b, c (P, R) from ``first`` on."""
     for k in range(len(at)):
-        f = at[k]
-        for m in range(len(columns)):
-            r = columns[m]
-            a[k, r] = ma[m, 0] * f[0] + ma[m, 1] * f[1] + ma[m, 2] * f[2] + ma[m, 3] * f[3]
+        f0, f1, f2, f3, f4, f5 = at[k, 0], at[k, 1], at[k, 2], at[k, 3], at[k, 4], at[k, 5]
+        f6, f7, f8, f9, f10 = at[k, 6], at[k, 7], at[k, 8], at[k, 9], at[k, 10]
+        for m in range(len(mc)):
+            r = first + m
+            a[k, r] = ma[0, m] * f0 + ma[1, m] * f1 + ma[2, m] * f2 + ma[3, m] * f3
             b[k, r] = (
-                mb[m, 0] * f[4]
-                + mb[m, 1] * f[5]
-                + mb[m, 2] * f[6]
-                + mb[m, 3] * f[7]
-                + mb[m, 4] * f[8]
-                + mb[m, 5] * f[9]
-                + mb[m, 6] * f[10]
+                mb[0, m] * f4
+                + mb[1, m] * f5
+                + mb[2, m] * f6
+                + mb[3, m] * f7
+                + mb[4, m] * f8
+                + mb[5, m] * f9
+                + mb[6, m] * f10
             )
             c[k, r] = mc[m]
 

@@ -208,19 +208,22 @@ def excess(
         ratio = peak(values)
         if ratio > 1:
             worst, most = ratio - 1, ratio
+        p0, p1, p2, p3, p4 = places[0], places[1], places[2], places[3], places[4]
         for r in range(a.shape[1]):
-            near, least = False, np.inf
-            for k in range(5):
-                j = places[k]
-                values[k] = a[j, r] * u[k] + b[j, r] * square[k] - c[j, r]
-                near = near or values[k] > -_NEAR
-                least = min(least, c[j, r])
-            if near:
-                high = peak(values)
-                if high > 0:
-                    worst = max(worst, high)
-                    if least > 0:
-                        most = max(most, 1 + high / least)
+            v0 = a[p0, r] * u[0] + b[p0, r] * square[0] - c[p0, r]
+            v1 = a[p1, r] * u[1] + b[p1, r] * square[1] - c[p1, r]
+            v2 = a[p2, r] * u[2] + b[p2, r] * square[2] - c[p2, r]
+            v3 = a[p3, r] * u[3] + b[p3, r] * square[3] - c[p3, r]
+            v4 = a[p4, r] * u[4] + b[p4, r] * square[4] - c[p4, r]
+            if max(v0, v1, v2, v3, v4) <= -_NEAR:
+                continue
+            values[0], values[1], values[2], values[3], values[4] = v0, v1, v2, v3, v4
+            high = peak(values)
+            if high > 0:
+                worst = max(worst, high)
+                least = min(c[p0, r], c[p1, r], c[p2, r], c[p3, r], c[p4, r])
+                if least > 0:
+                    most = max(most, 1 + high / least)
         over[i], factor[i] = worst, most
 
 

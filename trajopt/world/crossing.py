@@ -67,7 +67,7 @@ class Standing:
             outlines = shapely.polygons(outlines_at(places[near], angles[near], self.footprint))
             distance[near] = shapely.distance(solid, outlines)
             for i in np.flatnonzero(distance[near] <= 0.0):
-                distance[near[i]] = -_depth(solid, outlines[i])
+                distance[near[i]] = -depth_of(solid, outlines[i])
             least = np.minimum(least, distance)
         return least.reshape(np.shape(x))
 
@@ -93,7 +93,7 @@ def crossings(
         inside = shapely.relate_pattern(solid, outlines, _INSIDE)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], inside, [False]]).astype(np.int8)))
         for first, after in zip(edges[::2], edges[1::2], strict=True):
-            depth = max(_depth(solid, outline) for outline in outlines[first:after])
+            depth = max(depth_of(solid, outline) for outline in outlines[first:after])
             if depth <= _TOUCH:
                 continue
             found.append(Crossing(thing.name, float(s[first]), float(s[after - 1]), depth))
@@ -106,7 +106,7 @@ def outlines_at(places: Array, yaw: Array, footprint: Sequence[tuple[float, floa
     return np.asarray(turned + places[:, None, :])
 
 
-def _depth(solid: shapely.Polygon, outline: shapely.Polygon) -> float:
+def depth_of(solid: shapely.Polygon, outline: shapely.Polygon) -> float:
     """How far (m) a corner of what both have in common is inside one of them."""
     import shapely
 

@@ -141,7 +141,7 @@ def test_thesis_braking_downhill_is_unsafe() -> None:
     thesis = time_scale(
         down, task.replace({"limits.variant": "thesis"}).limits, robot=shipped("powerbot")
     )
-    physical = task.replace({"limits.variant": None}).limits
+    physical = task.replace({"limits.variant": None, "limits.slip_rule": "load"}).limits
     slip = next(limit for limit in physical if limit.name == "slip")
     rows = slip.rows(sample_path(down, thesis.s[:-1]), shipped("powerbot"))
     used = rows.a * thesis.sdd[:, None] + rows.b * thesis.sd[:-1, None] ** 2

@@ -1,0 +1,1 @@
+"""Maps made by scripts, and what routes on them cost."""
