@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -243,3 +244,22 @@ def test_bits_do_not_depend_on_the_number_of_threads() -> None:
         for count in ("1", "2", "4")
     }
     assert len(told) == 1
+
+
+@pytest.mark.slow
+def test_compiling_does_not_count(tmp_path: Path) -> None:
+    """With an empty compile cache: 50 evaluations in two seconds once, where 68,300 fit."""
+    told = subprocess.run(
+        [
+            *(sys.executable, "-c", "from trajopt.cli import main; main()", "solve"),
+            *(str(ROOT / "problems" / "smdw" / "table_5_3_1s.toml"), "--optimizer", "pso"),
+            *("--seconds", "2", "--out", str(tmp_path / "run"), "--no-pictures"),
+        ],
+        env={**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.returncode == 1, told.stderr  # the goal is missed
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["search"]["evaluations"] > 2_000

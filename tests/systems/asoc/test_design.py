@@ -28,6 +28,7 @@ from trajopt.systems.asoc.soil import SOILS, soil_named
 DATA = Path(__file__).parents[2] / "data" / "asoc"
 # These handle constraints, so they must not refuse this problem.
 CONSTRAINED = {
+    "auto",
     "pso",
     "pso-gbest",
     "pso-ring",
