@@ -19,7 +19,7 @@ LONGER = {
     "trajopt/robots/robot.py": "a robot, and all that follows from its file alone",
     "trajopt/refine/jerk.py": "one program, from its guesses to the checked motion",
     "trajopt/simulate/pybullet.py": "the one file that calls pybullet to build and step",
-    "trajopt/timing/scaling.py": "time_scale and its steps, from arguments to trajectory",
+    "trajopt/timing/fastest.py": "the core, from rows on a grid to a motion and its bound",
     "trajopt/report/run_folder.py": "writing and reading a run folder, kept in step",
 }
 

@@ -3,9 +3,9 @@ kinds (``wild``)."""
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from dataclasses import dataclass
+from time import process_time
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from trajopt.timing.track import track
 from trajopt.timing.trajectory import Trajectory
 
 BROKEN = 5e-5
-LONGEST = 60.0  # s, of one call
+LONGEST = 30.0  # s of one core, of one call
 SLOWER = 1e-3
 
 
@@ -39,13 +39,13 @@ class Judged:
 
 def judge(seed: int, peer: bool = False) -> Judged:
     """Case ``seed``; with ``peer`` beside toppra. Raises what no call may raise."""
-    case, began = wild(seed), time.perf_counter()
+    case, began = wild(seed), process_time()
     try:
         found = time_scale(case.path(), case.limits, robot=case.robot)
     except TrajoptError as error:
         return Judged(error=str(error))
     wrong = []
-    if time.perf_counter() - began > LONGEST:
+    if process_time() - began > LONGEST:
         wrong.append("it takes too long")
     used, told = shares(found, case.limits)
     wrong += [f"{name} used by {share!r}" for name, share in used.items() if share > 1 + BROKEN]
@@ -80,10 +80,9 @@ def by_toppra(case: Wild, graded: np.ndarray, count: int = 4000) -> Trajectory |
     except TrajoptError:
         return None
     places = np.union1d(u, graded)
-    close = np.append(True, np.diff(places) > 1e-9 * np.ptp(u) / count)
-    reached = path.parameter(places[close])
-    moves = np.append(True, np.diff(reached) > 0)
-    places, reached = places[close][moves], reached[moves]
+    reached = path.parameter(places)
+    moves = np.append(True, np.diff(reached) > 1e-15 * path.length)
+    places, reached = places[moves], reached[moves]
     squares = np.interp(reached, s, squares)
     found = Trajectory(
         path,

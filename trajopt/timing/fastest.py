@@ -115,7 +115,7 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
         if worst <= LARGEST_SLOWDOWN**2:
             found, lost = _found(ask, source, loose, (cells, solved, worst))
             if best is None or found.seconds < best.seconds:
-                best = found
+                best, kept = found, solved
             gaps.append(best.gap)
             if ask.gap is None:
                 if best.slowdown <= _SLOWED:
@@ -131,7 +131,7 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
             break
         u = np.sort(np.concatenate([u, ((u[:-1] + u[1:]) / 2)[split]]))
     if best is not None:
-        return replace(best, reason="" if ask.gap is None else _reason(best, solved, len(u)))
+        return replace(best, reason="" if ask.gap is None else _reason(best, kept, len(u)))
     at = int(np.argmax(solved.over))
     limit, place = broken(cells, solved, at)
     raise InfeasibleError(
