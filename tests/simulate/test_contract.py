@@ -111,6 +111,8 @@ def seen(**changes: object) -> Observation:
         swivels=np.zeros(0),
         loads=np.zeros(4),
         slip=np.zeros(4),
+        sliding=np.zeros((4, 2)),
+        suspension=np.zeros(0),
         spin_angles=np.zeros(4),
         contacts=4,
         penetration=1e-4,

@@ -75,7 +75,7 @@ def test_circle_is_driven_at_the_speed_friction_allows(engine):
     path = Path.through(points, start_direction=(1.0, 0.0), end_direction=(1.0, 0.0))
     robot = ROBOTS["rear_cog"]
     result = time_scale(
-        path, [limit("slip", friction=friction, sides=64)], robot=robot, engine=engine
+        path, [limit("slip", friction=friction, sides=64, rule="load")], robot=robot, engine=engine
     )
     middle = slice(len(result.s) // 3, 2 * len(result.s) // 3)
     # Steady turn about the centre: the centre of gravity, 0.132 m behind, needs wz^2 (0.132, R).
