@@ -128,8 +128,11 @@ def test_a_scene_for_physics_holds_what_is_near() -> None:
     from trajopt.world.occupancy import OccupancyMap
 
     scene = Scene(0.5, Flat(), (Wall("w", 1.0, (0, 9), (1, 9), 0.1),), map=OccupancyMap(cells, 0.1))
-    near = scene.around(np.array([[1.0, 1.0], [3.0, 1.0]]), 1.5)
+    near = scene.around(np.array([[3.0, 3.0], [3.5, 3.0]]), 1.5)
     assert [thing.name for thing in near.obstacles] == ["w", "map 0"]
     assert near.map is None
-    far = scene.around(np.array([[1.0, 1.0], [2.0, 1.0]]), 0.5)
+    far = scene.around(np.array([[2.0, 3.0], [3.0, 3.0]]), 0.5)
     assert [thing.name for thing in far.obstacles] == ["w"]
+    path = Path.through([[1.0, 3.0], [0.5, 3.0], [0.2, 3.0]])
+    left = path_clearance(path, OUTLINE, scene.keep_out)
+    assert (left.name, left.distance) == ("beyond the map", pytest.approx(-0.3, abs=1e-9))

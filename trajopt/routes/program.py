@@ -21,7 +21,6 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.optimize.symbols import QUIET, casadi
-from trajopt.routes.bspline import basis_rows
 from trajopt.routes.cells import (
     CELLS,
     FASTEST,
@@ -34,6 +33,7 @@ from trajopt.routes.cells import (
 from trajopt.routes.cover import Cover
 from trajopt.routes.envelope import Envelope
 from trajopt.routes.field import Field
+from trajopt.routes.mapping import cell_weights, field_call, summing
 
 _EVEN = 1e-2  # of the cost: weight of the mean square of |q'| less its mean, relative; chosen
 _CRAWL = 1e-3  # m/s, everywhere where speeds are left out
@@ -91,7 +91,7 @@ class Program:
         near = (first[:, None] + np.arange(4))[:, :, None] * axes + np.arange(axes)
         speeds = points * axes + np.arange(self.cells)[:, None] + np.arange(2)
         self.places = np.concatenate([near.reshape(self.cells, -1), speeds], axis=1)
-        self.weights = _weights(points)
+        self.weights = cell_weights(points)
         self.size = points * axes + self.cells + 1
         self.solver = self._build()
 
@@ -179,7 +179,7 @@ class Program:
         at = ca.reshape(x[self.places[nodes, : s.points].ravel().tolist()], s.points, n - 1)
         node_weights = ca.DM(self.weights[s.node_rows][:, nodes])
         spots = s.spots.map(n - 1)(at, node_weights, ca.repmat(centres, 1, n - 1))
-        self._call = _field_call(ca, self, discs * (n - 1))
+        self._call = field_call(ca, self, discs * (n - 1))
         seen = self._call(ca.reshape(spots, 2, discs * (n - 1)))
         d = [ca.reshape(seen[k, :], discs, n - 1) for k in range(6)]
         inputs = (local, weights, ca.repmat(shared, 1, n))
@@ -201,7 +201,7 @@ class Program:
         )
         jac = ca.MX(pattern, vector[order.tolist()])
         del values
-        summed = _sums(ca, self.places.ravel(), self.size)
+        summed = summing(ca, self.places.ravel(), self.size)
         grad = summed @ ca.vec(gradient)
         sigma, lam = ca.MX.sym("sigma"), ca.MX.sym("lam", g.numel())
         split = ca.vertsplit(
@@ -274,50 +274,4 @@ class Program:
         pattern = ca.Sparsity.triplet(
             self.size, self.size, (keys % self.size).tolist(), (keys // self.size).tolist()
         )
-        return ca.MX(pattern, _sums(ca, where, len(keys)) @ values)
-
-
-def _weights(points: int) -> Array:
-    """(28, N): of the four control points of each cell: value, first and second derivative at its
-    left end, the same at its right end, and the first in its middle."""
-    count = CELLS * (points - 3)
-    u = np.arange(count + 1) / CELLS
-    hair = 1e-9  # the same to rounding, but of the cell's own segment
-    pick = (np.arange(count) // CELLS)[:, None] + np.arange(4)
-    parts = [basis_rows(points, at, k) for at in (u[:-1] + hair, u[1:] - hair) for k in (0, 1, 2)]
-    parts.append(basis_rows(points, (u[:-1] + u[1:]) / 2, 1))
-    return np.concatenate([np.take_along_axis(part, pick, axis=1).T for part in parts])
-
-
-def _sums(ca: Any, where: IndexArray, size: int) -> Any:
-    """The matrix that sums values into places."""
-    count = len(where)
-    pattern = ca.Sparsity.triplet(size, count, where.tolist(), list(range(count)))
-    return ca.DM(pattern, np.ones(count))
-
-
-def _field_call(ca: Any, program: Program, count: int) -> Any:
-    """A CasADi function of places (2, M): distance and its five derivatives (6, M)."""
-
-    class FieldCall(ca.Callback):  # type: ignore[misc]
-        def __init__(self) -> None:
-            ca.Callback.__init__(self)
-            self.construct("field", {})
-
-        def get_n_in(self) -> int:
-            return 1
-
-        def get_n_out(self) -> int:
-            return 1
-
-        def get_sparsity_in(self, i: int) -> Any:  # noqa: ARG002
-            return ca.Sparsity.dense(2, count)
-
-        def get_sparsity_out(self, i: int) -> Any:  # noqa: ARG002
-            return ca.Sparsity.dense(6, count)
-
-        def eval(self, arguments: Any) -> list[Any]:
-            assert program.field is not None
-            return [program.field.smooth(np.asarray(arguments[0]).T)]
-
-    return FieldCall()
+        return ca.MX(pattern, summing(ca, where, len(keys)) @ values)

@@ -48,7 +48,8 @@ class Scene:
 
     @cached_property
     def keep_out(self) -> KeepOut:
-        """All that an outline keeps out of: obstacles by name, "map", and the outside of "space"."""
+        """All that an outline keeps out of: obstacles by name, the "map" and what
+        is beyond it, and the outside of "space"."""
         import shapely
 
         from trajopt.world.keep_out import KeepOut, outside_of
@@ -57,7 +58,9 @@ class Scene:
         names = [thing.name for thing in self.obstacles]
         if self.map is not None:
             cells = list(shapely.polygons(self.map.polygons))
-            solids, names = solids + cells, names + ["map"] * len(cells)
+            beyond = list(outside_of(shapely.Polygon(self.map.corners)))
+            solids, names = solids + cells + beyond, names + ["map"] * len(cells)
+            names += ["beyond the map"] * len(beyond)
         if self.space is not None:
             outside = list(outside_of(self.space))
             solids, names = solids + outside, names + ["space"] * len(outside)
