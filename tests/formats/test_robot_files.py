@@ -91,7 +91,7 @@ def test_wheels_of_a_written_model_turn_the_right_way(tmp_path: Path) -> None:
         assert np.sign(round(turn, 2)) == sign
 
 
-def test_racecar_is_read_and_asked(tmp_path: Path) -> None:
+def test_racecar_is_read_and_asked() -> None:
     data = pytest.importorskip("pybullet_data").getDataPath()
     file = Path(data) / "racecar" / "racecar.urdf"
     with pytest.raises(
@@ -200,7 +200,7 @@ def test_what_makes_no_wheel_is_refused_by_name(tmp_path: Path) -> None:
     file.write_text(
         file.read_text().replace('name="fork" type="revolute"', 'name="fork" type="prismatic"')
     )
-    with pytest.raises(ArgumentError, match="'fork'.*suspension"):
+    with pytest.raises(ArgumentError, match=r"'fork'.*suspension"):
         read_robot(file, ["left", "right", "front"])
     file.write_text("<sdf/>")
     with pytest.raises(ArgumentError, match="<robot>"):
