@@ -14,7 +14,7 @@ $(READY): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV): a few minutes on a fresh machine."
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[simulate,speed,sweep,optimizers,video,docs,dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[simulate,speed,sweep,optimizers,formats,video,docs,dev]'
 	touch $@
 
 demo: $(READY)  ## solve Table 5.3 and Scenario 1 forward35 (P1 and P2 free: it keeps clear of the step), check both in pybullet, write out/demo/

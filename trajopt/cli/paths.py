@@ -71,24 +71,31 @@ def explain(
 
 def export(
     plan: Plan,
-    out: Annotated[Path, typer.Option(help="CSV file to write")],
-    sample_time: Annotated[float, typer.Option(help="seconds between commands")] = 0.5,
+    out: Annotated[Path, typer.Option(help="file to write")],
+    format_: Annotated[
+        str | None,
+        typer.Option(
+            "--format",
+            help="csv, json (commands); mcap, rosbag (ROS 2); choreo; tum (race line); urdf, mjcf "
+            "(the robot). Without: what the file's name says",
+        ),
+    ] = None,
+    sample_time: Annotated[
+        float | None,
+        typer.Option(help="seconds between commands (0.5) or samples (by format)"),
+    ] = None,
     rule: Annotated[
-        str, typer.Option(help="mean: exact wheel angles; held: as Waheed 2006 digitises")
-    ] = "mean",
+        str | None,
+        typer.Option(help="of commands: mean (exact wheel angles) or held (as Waheed 2006)"),
+    ] = None,
     set_: Overrides = None,
 ) -> None:
-    """Write commands for every wheel: t (s), v_<wheel> (m/s at the rim), and steering_<wheel> (rad)
-    where it steers."""
-    from trajopt.control.commands import commands, export_commands
+    """Write a motion for other programs; as CSV: t (s), v_<wheel> (m/s at the rim),
+    steering_<wheel> (rad) where it steers, vx, vy, wz of the body."""
+    from trajopt.formats import export as write
 
-    if rule not in ("mean", "held"):
-        raise ArgumentError("--rule", rule, "mean or held")
-    orders = commands(
-        _timed(plan, set_, "auto"), sample_time, rule="mean" if rule == "mean" else "held"
-    )
-    export_commands(orders, out)
-    console.print(f"wrote {len(orders.times)} commands to {out}", soft_wrap=True)
+    told = write(_timed(plan, set_, "auto"), out, format_, sample_time=sample_time, rule=rule)
+    console.print(f"wrote {told} to {out}", soft_wrap=True)
 
 
 def compare(

@@ -22,28 +22,50 @@ def robot(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="robot file (*.toml) or name of a shipped robot; without: lists these",
+            help="robot file (*.toml, *.urdf, MJCF *.xml) or name of a shipped robot; without: "
+            "lists these",
             show_default=False,
         ),
     ] = None,
     set_: Overrides = None,
     out: Annotated[
-        Path | None, typer.Option("--out", help="file for a view from above (*.png, *.pdf, *.svg)")
+        Path | None,
+        typer.Option(
+            "--out",
+            help="file for a view from above (*.png, *.pdf, *.svg), or for the robot (*.toml, "
+            "*.urdf, MJCF *.xml)",
+        ),
+    ] = None,
+    wheels: Annotated[
+        str | None,
+        typer.Option("--wheels", help="of *.urdf and *.xml: the joints of the wheels, a,b,c"),
     ] = None,
 ) -> None:
-    """What a robot is: wheels, mobility, checks, and a view from above."""
+    """What a robot is: wheels, mobility, checks, and a view from above; robots of other programs
+    read and written."""
     from trajopt.robots import Robot, robot_names
     from trajopt.robots import robot as shipped
     from trajopt.robots.checks import findings
 
     if name is None:
-        if set_ or out is not None:
-            raise ArgumentError("robot", None, "a file or a shipped name, for --set and --out")
+        if set_ or out is not None or wheels is not None:
+            expected = "a file or a shipped name, for --set, --out and --wheels"
+            raise ArgumentError("robot", None, expected)
         _list([shipped(known) for known in robot_names()])
         return
     changes = overrides(set_)
-    file = name.endswith(".toml") or "/" in name
-    found = Robot.load(name, changes) if file else shipped(name, changes)
+    foreign = name.endswith((".urdf", ".xml"))
+    if foreign != (wheels is not None):
+        raise ArgumentError(
+            "--wheels", wheels, "joints a,b,c with a *.urdf or *.xml file, only there"
+        )
+    if wheels is not None:
+        from trajopt.formats import read_robot
+
+        found = read_robot(name, [joint.strip() for joint in wheels.split(",")], changes)
+    else:
+        file = name.endswith(".toml") or "/" in name
+        found = Robot.load(name, changes) if file else shipped(name, changes)
     _describe(found)
     faults = False
     for finding in findings(found):
@@ -53,11 +75,26 @@ def robot(
     for about, text in _slopes(found).items():
         console.print(f"{about}: {text}", highlight=False, soft_wrap=True)
     if out is not None:
-        from trajopt.report.robot_picture import save_robot_picture
-
-        console.print(f"written to {save_robot_picture(found, out)}", soft_wrap=True)
+        console.print(f"written to {_write(found, out)}", soft_wrap=True)
     if faults:
         raise typer.Exit(FAULTY)
+
+
+def _write(robot: Robot, out: Path) -> Path:
+    """A picture, or a file of the robot."""
+    if out.suffix == ".toml":
+        from trajopt.report.files import robot_toml, write_text
+
+        write_text(out, robot_toml(robot))
+    elif out.suffix in (".urdf", ".xml"):
+        from trajopt.formats import write_robot
+
+        write_robot(robot, out)
+    else:
+        from trajopt.report.robot_picture import save_robot_picture
+
+        return save_robot_picture(robot, out)
+    return out
 
 
 def _list(robots: list[Robot]) -> None:

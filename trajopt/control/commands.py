@@ -30,7 +30,8 @@ _MOST_COMMANDS = 1_000_000  # of one motion, chosen: a microsecond is no sample 
 class Commands:
     """Speeds (N, W), m/s, of the rims of the ``wheels``, each held from ``times`` (N,), s, for
     ``sample_time``; ``steering`` (N + 1, S), rad: angles of the ``steered`` wheels at the times and
-    at the end, from the angle that the robot's file gives."""
+    at the end, from the angle that the robot's file gives; ``body`` (N, 3): its twist (vx, vy, wz),
+    m/s, m/s, rad/s, held as the speeds are."""
 
     times: Array
     speeds: Array
@@ -38,6 +39,7 @@ class Commands:
     sample_time: float
     steering: Array
     steered: tuple[str, ...]
+    body: Array
 
     @property
     def duration(self) -> float:
@@ -93,15 +95,29 @@ def commands(
     state = trajectory.at(np.minimum(edges, trajectory.duration))
     radius = np.array([wheel.radius for wheel in robot.wheels])
     if rule == "held":
-        speeds = state.wheel_speeds[:-1] * radius
+        speeds, body = state.wheel_speeds[:-1] * radius, state.twist[:-1]
     elif rule == "mean":
         speeds = np.diff(state.wheel_angles, axis=0) * radius / sample_time
+        body = _travelled(trajectory, edges) / sample_time
     else:
         raise ArgumentError("rule", rule, "held or mean")
     wheels = steering_of(robot)
     names = tuple(wheels.names[i] for i in wheels.steered)
     steering = state.steering_angles[:, wheels.steered]
-    return Commands(edges[:-1], speeds, robot.wheel_names, sample_time, steering, names)
+    return Commands(edges[:-1], speeds, robot.wheel_names, sample_time, steering, names, body)
+
+
+def _travelled(trajectory: Trajectory, edges: Array) -> Array:
+    """(N - 1, 3): integral of the body's twist between ``edges`` (N,), s, by Simpson's rule in the
+    cells of the speed profile."""
+    inner = np.concatenate([trajectory.times, trajectory.times - trajectory.waits, edges])
+    grid = np.unique(np.clip(inner, 0.0, trajectory.duration))
+    middle = (grid[1:] + grid[:-1]) / 2
+    ends, mid = trajectory.at(grid).twist, trajectory.at(middle).twist
+    parts = (ends[:-1] + 4 * mid + ends[1:]) * np.diff(grid)[:, None] / 6
+    total = np.vstack([np.zeros(3), np.cumsum(parts, axis=0)])
+    at = np.searchsorted(grid, np.minimum(edges, trajectory.duration))
+    return np.diff(total[at], axis=0)
 
 
 def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array) -> Array:
@@ -127,16 +143,18 @@ def driven(orders: Commands, robot: Robot, start: Sequence[float], times: Array)
 
 
 def export_commands(orders: Commands, file: str | FilePath) -> FilePath:
-    """Write t (s), a column v_<wheel> (m/s) a wheel and a column steering_<wheel> (rad) a steered
-    wheel as CSV for a robot; ends with a row of speeds 0."""
+    """Write t (s), a column v_<wheel> (m/s) a wheel, a column steering_<wheel> (rad) a steered
+    wheel, and vx, vy (m/s), wz (rad/s) of the body as CSV; ends with a row of speeds 0."""
     path = FilePath(file)
     with whole_file(path) as part, part.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         names = [f"v_{name}" for name in orders.wheels]
-        writer.writerow(["t", *names, *(f"steering_{name}" for name in orders.steered)])
+        steered = (f"steering_{name}" for name in orders.steered)
+        writer.writerow(["t", *names, *steered, "vx", "vy", "wz"])
         times = np.append(orders.times, orders.duration)
         speeds = np.vstack([orders.speeds, np.zeros((1, len(orders.wheels)))])
-        for t, row in zip(times, np.hstack([speeds, orders.steering]), strict=True):
+        body = np.vstack([orders.body, np.zeros((1, 3))])
+        for t, row in zip(times, np.hstack([speeds, orders.steering, body]), strict=True):
             writer.writerow([f"{t:.6g}", *(f"{value:.9g}" for value in row)])
     return path
 

@@ -10,10 +10,12 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.files import read_table
 from trajopt.limits.speed_bound import SpeedProfile
 from trajopt.paths.path import Path
+from trajopt.paths.race_line import read_race_line
 from trajopt.schema import NonNegative, Point, Positive, Section, broken_rule
 
 
@@ -22,7 +24,9 @@ class PathSection(Section):
 
     points: tuple[Point, ...] | None = Field(None, description="x, y, m", min_length=2)
     file: str | None = Field(
-        None, description="CSV with columns x, y (m), and yaw (rad) where the heading is free"
+        None,
+        description="CSV with columns x, y (m), and yaw (rad) where the heading is free; or a race "
+        "line of the TUM's planner (s_m; x_m; ...), of which points and heading are taken",
     )
     heading: Literal["along", "free"] = Field(
         "along", description="along: the direction of travel; free: as headings say"
@@ -96,7 +100,9 @@ def read_points(
     """Points and yaws of a CSV file. Raises the broken rule of ``file``."""
     names = ("x", "y", "yaw") if with_yaw else ("x", "y")
     try:
-        table = np.column_stack(list(read_table(file, names).values()))
+        table = _race_line(file, with_yaw)
+        if table is None:
+            table = np.column_stack(list(read_table(file, names).values()))
     except ArgumentError as error:
         expected = f"a CSV file with columns {', '.join(names)} ({error})"
         raise broken_rule("path.file", str(file), expected) from None
@@ -105,6 +111,19 @@ def read_points(
     points = tuple((float(x), float(y)) for x, y in table[:, :2])
     _require_apart("path.file", points)
     return points, tuple(table[:, 2].tolist()) if with_yaw else None
+
+
+def _race_line(file: FilePath, with_yaw: bool) -> Array | None:
+    """(N, 2) or (N, 3): x, y (m) and yaw (rad) of a race line; None of what is none."""
+    try:
+        line = read_race_line(file)
+    except (OSError, ValueError) as error:
+        if isinstance(error, ArgumentError):
+            raise
+        return None  # ``read_table`` says why
+    if line is None:
+        return None
+    return np.column_stack([line.points, line.heading]) if with_yaw else line.points
 
 
 def _require_apart(key: str, points: tuple[Point, ...]) -> None:

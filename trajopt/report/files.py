@@ -10,6 +10,7 @@ from typing import Any
 
 from trajopt.errors import ArgumentError
 from trajopt.files import LARGEST_TABLE, content_of, seal, unseal, whole_file
+from trajopt.robots.robot import Robot
 
 FORMATS = ("png", "pdf", "svg")  # of pictures
 FORMAT = 3  # of run folders; a reader of another number refuses
@@ -99,7 +100,7 @@ def as_toml(table: dict[str, Any]) -> str:
 
 
 def _lines(table: dict[str, Any], place: tuple[str, ...]) -> list[str]:
-    values = [f"{_key(k)} = {_value(v)}" for k, v in table.items() if not isinstance(v, dict)]
+    values = [f"{_key(k)} = {toml_value(v)}" for k, v in table.items() if not isinstance(v, dict)]
     head = (
         ["", f"[{'.'.join(_key(part) for part in place)}]"]
         if place and (values or not table)
@@ -113,10 +114,23 @@ def _lines(table: dict[str, Any], place: tuple[str, ...]) -> list[str]:
 
 def _key(name: str) -> str:
     bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
-    return name if bare else _value(name)
+    return name if bare else toml_value(name)
 
 
-def _value(value: Any) -> str:
+def robot_toml(robot: Robot) -> str:
+    """The file of a robot, with an array of tables a kind of part."""
+    tables = robot.description.model_dump(mode="json", exclude_defaults=True)
+    arrays = {key: tables.pop(key, []) for key in ("wheels", "pivots", "motors", "steering")}
+    lines = [as_toml(tables)]
+    for key, parts in arrays.items():
+        for part in parts:
+            values = [f"{name} = {toml_value(value)}" for name, value in part.items()]
+            lines.append("\n".join([f"[[{key}]]", *values, ""]))
+    return "\n".join(lines)
+
+
+def toml_value(value: Any) -> str:
+    """TOML of a value in one line, tables inline."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (int, float)):
@@ -124,9 +138,9 @@ def _value(value: Any) -> str:
     if isinstance(value, str):  # JSON's escapes are TOML's, but for DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(_value(part) for part in value) + "]"
+        return "[" + ", ".join(toml_value(part) for part in value) + "]"
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(k)} = {toml_value(v)}" for k, v in value.items()) + " }"
     raise ArgumentError("value", value, "a string, boolean, number, array or table")
 
 

@@ -161,6 +161,7 @@ def asoc_robot(geometry: AsocGeometry, alpha: ArrayLike | None = None) -> Robot:
         {
             "name": f"asoc-{geometry.modules}",
             "about": tables["about"],
+            "sharing": tables["sharing"],
             "body": tables["body"] | body,
             "wheels": wheels,
             "pivots": [
