@@ -209,7 +209,7 @@ def other_rows(repetitions: int) -> list[Row]:
 def solve_rows(repetitions: int) -> list[Row]:
     problem = load_problem(PROBLEM)
     rows = []
-    for name, goal in (("lattice", 8), ("pso", 40), ("ipopt", 20)):
+    for name, goal in (("lattice", 8), ("pso", 40), ("lattice+ipopt+newton", 20)):
         (seconds,) = in_turn(
             [lambda n=name: solve(problem, optimizer=n)],  # type: ignore[misc]  # mypy infers no lambda default
             max(3, repetitions // 3),
