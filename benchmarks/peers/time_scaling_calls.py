@@ -35,7 +35,7 @@ from trajopt.problem import load_problem
 from trajopt.robots.robot import Robot
 from trajopt.timing.scaling import time_scale
 
-LIMITS = (Slip(0.332, sides=16), Tip(), WheelAcceleration(8.0), WheelSpeed(12.0))
+LIMITS = (Slip(0.332, sides=16, rule="load"), Tip(), WheelAcceleration(8.0), WheelSpeed(12.0))
 PROBLEM = "problems/smdw/table_5_3.toml"
 LAP = 3000.0  # m of centre line, in points 3 m apart; chosen
 HEADER = ("work", "ms", "peer", "its ms", "peer / ours", "goal")
@@ -119,7 +119,7 @@ def plain_rows(repetitions: int) -> list[Row]:
 def lap_row(repetitions: int) -> Row:
     """A centre line as a lap: path and timing, and a forward-backward profile alone on a 2 m grid."""
     points = centre_line()
-    limits: tuple[Limit, ...] = (Speed(15.0), Acceleration(2.0, 3.0), Slip(0.35))
+    limits: tuple[Limit, ...] = (Speed(15.0), Acceleration(2.0, 3.0), Slip(0.35, rule="load"))
     one = ball_robot()
     ours, theirs = in_turn(
         [
