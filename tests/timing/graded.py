@@ -193,12 +193,12 @@ def used(name: str, now: Sampled, limit: object, which: str = "balls") -> np.nda
     loads = _loads(fx, fy, which)
     if name == "contact":
         return 1 - loads.min(axis=1) / (G / 4)  # of an even share of the weight
-    if name == "slip" and which == "balls":
-        free = limit.friction * loads[:, :2].sum(axis=1)
-        return 1 + (np.hypot(fx, fy) - free) / (limit.friction * G)
     along, torques = _torques(now, fx, fy, spin_rate, which)
     if name == "slip":
-        over = np.abs(along) / MASS - limit.friction * loads
+        force, held = np.abs(along) / MASS, limit.friction * loads
+        if which == "balls":  # both wheels hold the same across
+            force, held = np.hypot(force, fy[:, None] / 2), held[:, :2]
+        over = force - held
         return 1 + over.max(axis=1) / (limit.friction * G / 4)
     if name == "wheel_torque":
         return np.abs(torques).max(axis=1) / limit.largest

@@ -220,7 +220,8 @@ def test_compiled_rows_are_those_of_the_limits(name):
     u = graded_grid(measure, 200)
     ours = cells_of(along, measure, u, source, np.asarray(path.basis.knots)).table
     theirs = cells_of(along, measure, u, Readable(limits), np.asarray(path.basis.knots)).table
-    close = 3e-7 if name == "powerbot" else 1e-12
+    # Castors are known to 1e-7 rad; the load of one of four wheels is a quarter of a row's scale.
+    close = 1.2e-6 if name == "powerbot" else 1e-12
     for k in "abc":
         mine, reference = (np.sort(getattr(t, k), axis=1) for t in (ours, theirs))
         np.testing.assert_allclose(mine, reference, atol=close * max(1, np.abs(reference).max()))
