@@ -253,7 +253,7 @@ def search_objective(problem: Problem) -> SearchObjective:
     """What the control points of a problem are searched for; with obstacles, clear of them."""
     terminal = terminal_objective(problem)
     kind = problem.objective.kind
-    duration = None if kind == "terminal" else DurationObjective(terminal, kind)
+    duration = DurationObjective(terminal, kind) if kind in ("duration", "energy") else None
     obstacles = problem.scene.obstacles
     if not obstacles:
         return terminal if duration is None else duration

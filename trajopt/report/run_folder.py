@@ -115,7 +115,8 @@ def write_solution(
         expected = f"a folder without {', '.join(strange)}: no run that ended wrote this"
         raise ArgumentError("folder", str(folder), expected)
     # Read first: the problem's file may stand in this folder itself.
-    names, stored = {}, {}
+    names: dict[str, str] = {}
+    stored: dict[str, bytes] = {}
     for key, file in problem.files.items():
         names[key] = key.removeprefix("ground.").replace(".", "_") + file.suffix
         cells = key == "map" and file.suffix in MAPS

@@ -152,7 +152,7 @@ def _cell(ca: Any, kind: Kind, z: Any, w: Any, shared: Any) -> tuple[Any, Any, A
     control = ca.reshape(z[: 4 * axes], axes, 4)
     va, vb = z[4 * axes], z[4 * axes + 1]
     q = [control @ w[4 * k : 4 * k + 4] for k in range(7)]
-    left, right = (_end(ca, kind, *q[k : k + 3], length) for k in (0, 3))
+    left, right = (_end(ca, kind, q[k], q[k + 1], q[k + 2], length) for k in (0, 3))
     ds = (left.rate + 4 * _rate(ca, kind, q[6], length) + right.rate) / (6 * CELLS)
     time = 2 * ds / (va + vb + _STILL)
     u = (vb**2 - va**2) / (2 * ds)

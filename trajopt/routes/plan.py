@@ -169,7 +169,7 @@ def _told(near: float) -> str:
 
 def _attempts(job: _Job, field: Field, found: Sequence[Way]) -> Iterator[Attempt]:
     """Two stages for every way; then, for least time, one program from the better ones."""
-    firsts = []
+    firsts: list[tuple[Attempt, Solved, tuple[Field, float], Program]] = []
     for way in found:
         if way.length > LONGER * found[0].length and firsts:
             continue

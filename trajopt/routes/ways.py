@@ -85,7 +85,7 @@ def _graph(grid: Field, free: BoolArray, radius: float, wide: float) -> object:
     numbers = np.arange(free.size).reshape(free.shape)
     room = np.clip((grid.distance - radius) / max(wide - radius, grid.spacing), 0.0, 1.0)
     dear = 1.0 + _GRAZING * (1.0 - room) ** 2
-    rows, columns, costs = list[Array](), list[Array](), list[Array]()
+    rows, columns, costs = list[IntArray](), list[IntArray](), list[Array]()
     for i, j in _STEPS:
         here = (slice(0, free.shape[0] - i), slice(max(-j, 0), free.shape[1] - max(j, 0)))
         there = (slice(i, None), slice(max(j, 0), free.shape[1] + min(j, 0)))
@@ -93,7 +93,7 @@ def _graph(grid: Field, free: BoolArray, radius: float, wide: float) -> object:
         rows.append(numbers[here][both])
         columns.append(numbers[there][both])
         costs.append((dear[here][both] + dear[there][both]) / 2 * grid.spacing * np.hypot(i, j))
-    a, b, c = (np.concatenate(part) for part in (rows, columns, costs))
+    a, b, c = np.concatenate(rows), np.concatenate(columns), np.concatenate(costs)
     pair = (np.concatenate([a, b]), np.concatenate([b, a]))
     return csr_array((np.concatenate([c, c]), pair), shape=(free.size, free.size))
 
