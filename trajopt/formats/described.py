@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.errors import ArgumentError, ProblemError
+from trajopt.errors import ArgumentError
+from trajopt.formats.asked import require_all, require_radii
 from trajopt.formats.tree import Frames, Part, Solid, below, extent, frames, weighed
 from trajopt.robots.robot import Robot
 from trajopt.schema import changes_of, set_key
@@ -25,19 +26,6 @@ _LEVEL = 0.02  # rad that an axle may lean from level, an upright axis from upri
 _ASIDE = 0.02  # of its radius that a steered wheel may stand beside its axis; chosen
 _UNEVEN = 0.005  # m by which wheels may differ in where they touch the ground; chosen
 _ROUND = 1e-4  # rad, chosen: files round pi / 2; angles this near to such multiples mean them
-_NEEDED = {  # key -> an example of what --set takes
-    "body.mass": "20.0",
-    "body.cog": "[0.0, 0.0, 0.1]",
-    "body.chassis": "[0.5, 0.3, 0.2]",
-    "body.chassis_place": "[0.1, 0.0]",
-    "body.clearance": "0.05",
-    "motors": '[{name="drive", wheels=["NAME"], torque=2.0}]',
-    "skid.effective_track": "0.6",
-    "radius": "0.1",
-    "width": "0.04",
-    "mass": "0.5",
-    "torque": "2.0",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +58,7 @@ def described(
     places = {f"wheels.{w['name']}.position": w.pop("beside", None) for w in tables["wheels"]}
     for key, value in changes_of(changes, str(file)):
         set_key(tables, key, value, str(file))
-    _require_all(tables, changes, places, file)
+    require_all(tables, changes, places, file)
     return Robot.of(tables, str(file))
 
 
@@ -173,7 +161,7 @@ def _tables(
 ) -> dict[str, Any]:
     """The tables of the robot's file, without what the parts do not say."""
     radii = {w.table["name"]: _radius(w.table, changes) for w in wheels}
-    _require_radii(radii, file)
+    require_radii(radii, file)
     floors = {w.table["name"]: float(w.centre[2]) - radii[w.table["name"]] for w in wheels}
     floor = min(floors.values())
     high = max(floors, key=lambda name: floors[name])
@@ -262,49 +250,6 @@ def _radius(table: Mapping[str, Any], changes: Mapping[str, Any]) -> float | Non
         if isinstance(changes.get(f"wheels.{name}.radius"), (int, float)):
             return float(changes[f"wheels.{name}.radius"])
     return table.get("radius")
-
-
-def _require_all(
-    tables: dict[str, Any], changes: Mapping[str, Any], places: Mapping[str, Any], file: Path
-) -> None:
-    """Raises ProblemError with all keys that a robot needs and that are not said; ``places``:
-    where steered wheels beside their axis are."""
-    body = ("mass", "cog", "chassis", "chassis_place", "clearance")
-    missing = [f"body.{key}" for key in body if key not in tables["body"]]
-    for array, keys in (("wheels", ("width", "mass", "position")), ("motors", ("torque",))):
-        for key in keys:
-            without = [element["name"] for element in tables[array] if not element.get(key)]
-            missing += _keys(array, key, without, len(tables[array]))
-    if not tables["motors"] and "motors" not in changes:
-        missing.append("motors")
-    if tables.get("skid") == {}:
-        if {wheel["kind"] for wheel in tables["wheels"]} == {"fixed"}:
-            missing.append("skid.effective_track")
-        del tables["skid"]
-    _require(missing, file, places)
-
-
-def _keys(array: str, key: str, names: Sequence[str], count: int) -> list[str]:
-    """Keys of elements; ``all`` for all of them."""
-    every = len(names) == count > 1 and key != "position"
-    return [f"{array}.{name}.{key}" for name in (["all"] if every else names)]
-
-
-def _require_radii(radii: Mapping[str, float | None], file: Path) -> None:
-    _require([f"wheels.{name}.radius" for name, radius in radii.items() if not radius], file)
-
-
-def _require(missing: Sequence[str], file: Path, places: Mapping[str, Any] | None = None) -> None:
-    if not missing:
-        return
-    examples = {**_NEEDED, **(places or {})}
-    told = [f"--set '{key}={examples.get(key) or examples[key.split('.')[-1]]}'" for key in missing]
-    why = "what the file does not say, by " + " ".join(told)
-    if "skid.effective_track" in missing:
-        why += " (fixed wheels that forbid every turn slide: approximated by a track)"
-    if any(key.endswith("position") for key in missing):
-        why += " (steered wheels beside their axis: approximated by one through that place)"
-    raise ProblemError(str(file), missing[0], "missing", why)
 
 
 def _given(**values: Any) -> dict[str, Any]:
