@@ -17,7 +17,6 @@ LONGER = {
     "trajopt/cli/sweep.py": "one command and its subcommands, which share options and messages",
     "trajopt/optimize/swarm.py": "one compiled kernel and its readable twin, side by side",
     "trajopt/robots/robot.py": "a robot, and all that follows from its file alone",
-    "trajopt/refine/jerk.py": "one program, from its guesses to the checked motion",
     "trajopt/simulate/pybullet.py": "the one file that calls pybullet to build and step",
     "trajopt/timing/fastest.py": "the core, from rows on a grid to a motion and its bound",
     "trajopt/report/run_folder.py": "writing and reading a run folder, kept in step",

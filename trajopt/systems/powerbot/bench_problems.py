@@ -88,7 +88,7 @@ def moved_knots(file: FilePath) -> RouteObjective:
     The limits are the physical ones and leave out the safety speed, which alone would set the
     duration.
     """
-    problem = load_problem(file, {"limits.variant": None})
+    problem = load_problem(file, {"limits.variant": None, "limits.slip_rule": "load"})
     if problem.ground.ramps:
         raise ArgumentError("problem", str(file), "a path on level ground")
     path = problem.flat_path
