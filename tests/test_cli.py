@@ -125,7 +125,7 @@ def test_export_ends_at_rest(tmp_path):
     file = tmp_path / "commands.csv"
     assert trajopt("export", "problems/powerbot/experiment_1.toml", "--out", file).returncode == 0
     table = pd.read_csv(file)
-    assert list(table.columns) == ["t", "v_left", "v_right"]
+    assert list(table.columns) == ["t", "v_left", "v_right", "vx", "vy", "wz"]
     assert (table.iloc[-1, 1:] == 0).all()
 
 

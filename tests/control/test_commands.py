@@ -64,8 +64,8 @@ def test_finer_sampling_is_better(plan: Trajectory) -> None:
 def test_export_and_compare(plan: Trajectory, tmp_path: FilePath) -> None:
     file = export_commands(commands(plan, 0.1), tmp_path / "plan.csv")
     rows = list(csv.reader(file.open(encoding="utf-8")))
-    assert rows[0] == ["t", "v_left", "v_right"]
-    assert rows[-1][1:] == ["0", "0"]
+    assert rows[0] == ["t", "v_left", "v_right", "vx", "vy", "wz"]
+    assert rows[-1][1:] == ["0"] * 5
     t = np.arange(0, plan.duration, 0.1)
     state = plan.at(t)
     log = tmp_path / "log.csv"

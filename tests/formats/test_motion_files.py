@@ -154,7 +154,7 @@ def test_choreo_by_its_own_library(free: Trajectory, tmp_path: Path) -> None:
 
 
 def test_race_line_out_and_in(car: Trajectory, tmp_path: Path) -> None:
-    export(car, tmp_path / "line.csv", "tum", sample_time=0.05)
+    export(car, tmp_path / "line.csv", "tum", sample_time=0.02)
     table = pd.read_csv(tmp_path / "line.csv", sep="; ", engine="python")
     assert list(table.columns)[1:] == ["x_m", "y_m", "psi_rad", "kappa_radpm", "vx_mps", "ax_mps2"]
     line = read_race_line(tmp_path / "line.csv")
@@ -174,7 +174,7 @@ def test_race_line_out_and_in(car: Trajectory, tmp_path: Path) -> None:
 def test_a_problem_takes_a_race_line(car: Trajectory, tmp_path: Path) -> None:
     export(car, tmp_path / "line.csv", "tum")
     (tmp_path / "p.toml").write_text(
-        'title = "t"\n[robot]\nname = "car"\n[path]\nfile = "line.csv"\n[limits]\nspeed = 0.5\n',
+        'title = "t"\n[robot]\nname = "car"\n[path]\nfile = "line.csv"\n[limits]\nspeed = 0.5\n[ground]\nfriction = 0.8\n',
         encoding="utf-8",
     )
     told = CliRunner().invoke(

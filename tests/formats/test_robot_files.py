@@ -235,8 +235,17 @@ def _by_pybullet(file: Path) -> tuple[float, list[float], float]:
         flags = bullet.URDF_USE_INERTIA_FROM_FILE
         body = bullet.loadURDF(str(file), flags=flags, physicsClientId=client)
         start = bullet.getBasePositionAndOrientation(body, physicsClientId=client)
+        links = ElementTree.parse(file).getroot().findall("link")
+        heavy = [x.get("name") for x in links if x.find("inertial") is not None]
         rows = []
         for link in range(-1, bullet.getNumJoints(body, physicsClientId=client)):
+            named = (
+                bullet.getBodyInfo(body, physicsClientId=client)[0]
+                if link < 0
+                else bullet.getJointInfo(body, link, physicsClientId=client)[12]
+            )
+            if named.decode() not in heavy:
+                continue  # Bullet makes them weigh 1 kg
             info = bullet.getDynamicsInfo(body, link, physicsClientId=client)
             at = start if link < 0 else bullet.getLinkState(body, link, physicsClientId=client)[:2]
             turn = bullet.multiplyTransforms(

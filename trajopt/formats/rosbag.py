@@ -117,6 +117,11 @@ def _joints(trajectory: Trajectory, state: State) -> tuple[list[str], Array, Arr
     turns = list(turning.values())
     return (
         names,
-        np.hstack([state.spin_angles[:, spins], state.steering_angles[:, turns]]),
-        np.hstack([state.spin_rates[:, spins], state.steering_rates[:, turns]]),
+        _rows(state.spin_angles[:, spins], state.steering_angles[:, turns]),
+        _rows(state.spin_rates[:, spins], state.steering_rates[:, turns]),
     )
+
+
+def _rows(*parts: Array) -> Array:
+    """Side by side, each row in one piece, as rosbags wants it."""
+    return np.ascontiguousarray(np.hstack(parts))
