@@ -49,9 +49,10 @@ def _keys(array: str, key: str, names: Sequence[str], count: int) -> list[str]:
     return [f"{array}.{name}.{key}" for name in (["all"] if every else names)]
 
 
-def require_radii(radii: Mapping[str, float | None], file: Path) -> None:
-    """Raises ProblemError with the wheels whose radius is not said."""
+def require_radii(radii: Mapping[str, float | None], file: Path) -> dict[str, float]:
+    """The radii, all of them. Raises ProblemError with the wheels whose radius is not said."""
     _require([f"wheels.{name}.radius" for name, radius in radii.items() if not radius], file)
+    return {name: radius for name, radius in radii.items() if radius}
 
 
 def _require(missing: Sequence[str], file: Path, places: Mapping[str, Any] | None = None) -> None:

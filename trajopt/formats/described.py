@@ -160,8 +160,8 @@ def _tables(
     parts: Sequence[Part], at: Frames, wheels: Sequence[_Wheel], changes: dict[str, Any], file: Path
 ) -> dict[str, Any]:
     """The tables of the robot's file, without what the parts do not say."""
-    radii = {w.table["name"]: _radius(w.table, changes) for w in wheels}
-    require_radii(radii, file)
+    told = {w.table["name"]: _radius(w.table, changes) for w in wheels}
+    radii = require_radii(told, file)
     floors = {w.table["name"]: float(w.centre[2]) - radii[w.table["name"]] for w in wheels}
     floor = min(floors.values())
     high = max(floors, key=lambda name: floors[name])

@@ -67,7 +67,7 @@ def _body(parent: Element, link: Link, asset: Element, meshes: dict[Shape, str])
             told |= {"stiffness": repr(joint.stiffness), "springref": repr(joint.rest)}
         if joint.reach is not None:
             told["range"] = _told(joint.reach)
-        sub(body, "joint", type="slide" if joint.role == "spring" else "hinge", **told)
+        sub(body, "joint", {"type": "slide" if joint.role == "spring" else "hinge", **told})
     sub(
         body, "inertial", pos=_told(link.cog), mass=repr(link.mass), diaginertia=_told(link.inertia)
     )
@@ -90,7 +90,7 @@ def _geom(
 ) -> None:
     kind = {"disc": "cylinder", "hull": "mesh"}.get(shape.kind, shape.kind)
     place = {"pos": _told(shape.pose.place), "quat": _told(shape.pose.quaternion)}
-    geom = ElementTree.SubElement(body, "geom", type=kind, **place, **how)
+    geom = ElementTree.SubElement(body, "geom", {"type": kind, **place, **how})
     if kind == "mesh":
         if shape not in meshes:
             meshes[shape] = f"hull_{len(meshes)}"
@@ -113,11 +113,11 @@ def _servo(servos: Element, link: Link, speed: float) -> None:
     told = {"name": name, "joint": name, "forcerange": _told((-joint.effort, joint.effort))}
     if joint.drive == "velocity":
         gain = repr(joint.effort / (_SOFT * speed))
-        ElementTree.SubElement(
-            servos, "velocity", kv=gain, ctrlrange=_told((-speed, speed)), **told
-        )
+        limits = {"kv": gain, "ctrlrange": _told((-speed, speed))}
+        ElementTree.SubElement(servos, "velocity", limits | told)
     elif joint.drive is not None and joint.role in ("steer", "tilt"):
-        ElementTree.SubElement(servos, "position", kp=repr(joint.stiffness), dampratio="1", **told)
+        stiff = {"kp": repr(joint.stiffness), "dampratio": "1"}
+        ElementTree.SubElement(servos, "position", stiff | told)
 
 
 def _told(values: Any) -> str:
@@ -162,7 +162,7 @@ def _part(
             reach = (low, high)
     else:
         called = spec.name  # by which --wheels can name a ball
-    turn = _rotation(mujoco, model.body_iquat[body])
+    turn = _turned(mujoco, model.body_iquat[body])
     effort, speed = drives.get(first, (None, None)) if count and not root else (None, None)
     geoms = range(
         int(model.body_geomadr[body]), int(model.body_geomadr[body]) + int(model.body_geomnum[body])
@@ -174,7 +174,7 @@ def _part(
     return Part(
         spec.name, int(model.body_parentid[body]) - 1, called, moves,
         np.zeros(3) if root else model.body_pos[body].copy(),
-        np.eye(3) if root else _rotation(mujoco, model.body_quat[body]),
+        np.eye(3) if root else _turned(mujoco, model.body_quat[body]),
         axis, anchor, reach, bool(count) and not root and first in drives, effort, speed,
         float(model.body_mass[body]), model.body_ipos[body].copy(),
         turn @ np.diag(model.body_inertia[body]) @ turn.T,
@@ -184,7 +184,7 @@ def _part(
 
 def _solid(mujoco: Any, model: Any, geom: int) -> Solid:
     kinds, kind = mujoco.mjtGeom, int(model.geom_type[geom])
-    place, turn = model.geom_pos[geom].copy(), _rotation(mujoco, model.geom_quat[geom])
+    place, turn = model.geom_pos[geom].copy(), _turned(mujoco, model.geom_quat[geom])
     r, half, _ = size = model.geom_size[geom].copy()
     if kind == kinds.mjGEOM_SPHERE:
         return Solid("sphere", np.full(3, r), place, turn)
@@ -223,7 +223,7 @@ def _drives(mujoco: Any, model: Any) -> dict[int, tuple[float | None, float | No
     return found
 
 
-def _rotation(mujoco: Any, quaternion: Array) -> Array:
+def _turned(mujoco: Any, quaternion: Array) -> Array:
     found = np.zeros(9)
     mujoco.mju_quat2Mat(found, quaternion)
     return found.reshape(3, 3)
