@@ -196,7 +196,7 @@ def test_two_robots_drive_the_same_field_with_the_same_commands(robot, tmp_path)
     assert "pitch" in told.stdout
     assert ("castor rate" in told.stdout) == (robot == "asoc")
     assert trajopt("export", out, "--out", orders).returncode == 0
-    assert len(pd.read_csv(orders).columns) == 1 + len(problem.robot.wheel_names)
+    assert len(pd.read_csv(orders).columns) == 4 + len(problem.robot.wheel_names)
 
 
 def test_explain_says_that_a_slow_steering_costs_time():

@@ -265,7 +265,7 @@ def _models(annotation: Any) -> Iterator[Any]:
 def _as_json(value: Any) -> Any:
     """NumPy values, sections and paths as JSON. Raises TypeError for anything else."""
     if isinstance(value, BaseModel):
-        return value.model_dump(mode="json", exclude_none=True)
+        return value.model_dump(mode="json", exclude_none=True, by_alias=True)
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, os.PathLike):

@@ -96,7 +96,7 @@ def test_commands_know_it_by_the_variable_and_by_the_option() -> None:
         assert "error" not in done.stderr
     unknown = run("-c", command, "solve", SCENARIO, "--optimizer", NAME, plugins="")
     assert unknown.returncode == 2
-    assert "one of pso" in unknown.stderr
+    assert "one of auto, pso" in unknown.stderr
 
 
 @pytest.mark.slow

@@ -106,7 +106,7 @@ def test_there_are_eight():
         ({"robot.wheels.front-left.radius": -1.0}, "robot.wheels[0].radius", "greater than 0"),
         ({"robot.file": "nowhere.toml"}, "robot.file", "existing file"),
         ({"path": {"points": [[0, 0], [1, 1]]}}, "path", "take out [path]"),
-        ({"spline": None}, "spline", "add [spline]"),
+        ({"spline": None}, "goal.wheels", "add [spline]"),
         ({"climb": {"step": "step", "gap": 0.02}}, "climb", "take out [climb]"),
         ({"robot.name": "r2d2"}, "robot.name", "loc8"),
         ({"limits.speed.x": 1.0}, "limits.speed.x", "below a table"),

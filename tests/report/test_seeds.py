@@ -56,7 +56,7 @@ def test_flat_curves_are_said_in_words(exact: Solution, through_actuators: Solut
     assert exact.search is not None
     assert through_actuators.search is not None
     texts = [t.get_text() for t in convergence_figure(exact, exact.search).axes[0].texts]
-    assert texts == ["lattice finds its answer in one go: nothing converges"]
+    assert texts == ["auto finds its answer in one go: nothing converges"]
     assert not convergence_figure(through_actuators, through_actuators.search).axes[0].texts
 
 

@@ -257,7 +257,7 @@ def test_command_lists_describes_changes_and_draws(tmp_path: Path) -> None:
     assert "fault" in text
     with pytest.raises(ProblemError, match=r"mine\.toml: body\.weight"):
         run(str(mine), "--set", "body.weight=3")
-    with pytest.raises(ArgumentError, match="for --set and --out"):
+    with pytest.raises(ArgumentError, match="for --set, --out and --wheels"):
         run("--set", "body.mass=3.0")
     with pytest.raises(ArgumentError, match=r"ends in \.png"):
         run("car", "--out", str(tmp_path / "top.gif"))

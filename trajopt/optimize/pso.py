@@ -18,6 +18,8 @@ Velocities start at zero. w_k = w, or falls linearly from ``inertia`` to ``final
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
@@ -162,8 +164,9 @@ class ParticleSwarm:
         unseen = 0  # iterations in a row without a particle inside
         inside = self.boundary != "none"
         levels = Levels(run)
+        share = _share(run, swarm)
         while True:
-            swarm.used = run.used
+            swarm.used = share()
             asked = swarm.ask()
             if self.boundary != "invisible":
                 result = run.evaluate(asked, inside=inside)
@@ -190,6 +193,14 @@ class ParticleSwarm:
                 return Status.CONVERGED, "the swarm has collapsed to one point"
             if self.stagnation is not None and swarm.idle >= self.stagnation:
                 return Status.CONVERGED, f"no improvement in {self.stagnation} iterations"
+
+
+def _share(run: Run, swarm: Swarm) -> Callable[[], float]:
+    """What tells the share of the budget that is used up: by iterations, not by what else counts as
+    an evaluation, so that workers give the same bits."""
+    begun, most = swarm.iteration, run.remaining() / len(swarm.x)
+    seconds = run.budget.seconds or math.inf
+    return lambda: min(1.0, max((swarm.iteration - begun) / most, run.elapsed / seconds))
 
 
 def _clans(own: Array, run: Run, swarm: Swarm) -> None:

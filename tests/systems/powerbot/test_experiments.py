@@ -178,7 +178,6 @@ def test_ramp_keeps_the_curve_in_the_plane() -> None:
         ({"path": {"closed": True}}, "path.closed"),
         ({"path": {"goal_rate": None}}, "goal_rate"),
         ({"start": {"pose": [0.0, 0.0, 0.0]}}, "start.pose"),
-        ({"space": {"x": [0.0, 1.0], "y": [0.0, 1.0]}}, "take out \\[space\\]"),
         ({"ground": {"grade": 0.1}}, "ground.grade"),
         ({"limits": {"variant": "magic"}}, "thesis"),
         ({"limits": {"slip_share": 0.5, "slip": False}}, "slip_share"),
