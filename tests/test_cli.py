@@ -165,7 +165,11 @@ def test_every_command_takes_problem_and_folder_of_every_kind(file, tmp_path):
             done = trajopt(*arguments)
             assert done.returncode == 0, done.stderr
         wheels = load_problem(ROOT / path).robot.wheel_names
-        assert list(pd.read_csv(orders).columns) == ["t", *(f"v_{name}" for name in wheels)]
+        assert list(pd.read_csv(orders).columns) == [
+            "t",
+            *(f"v_{name}" for name in wheels),
+            *("vx", "vy", "wz"),
+        ]
         told[plan] = trajopt("compare", plan, tmp_path / "log.csv").stdout
         assert "speed error" in told[plan]
         assert "0.0000 m/s" in told[plan]
