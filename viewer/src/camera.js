@@ -13,11 +13,11 @@ export const PRESETS = {
 };
 
 export class Eye {
-  constructor(canvas) {
-    this.camera = new PerspectiveCamera(30, 1, 0.02, 300);
+  constructor(canvas, across) {
+    this.camera = new PerspectiveCamera(30, 1, 0.02, Math.max(300, 8 * across));
     this.camera.up.set(0, 0, 1);
     this.controls = new OrbitControls(this.camera, canvas);
-    Object.assign(this.controls, { enableDamping: false, maxPolarAngle: 0.497 * Math.PI, minDistance: 0.15, maxDistance: 80 });
+    Object.assign(this.controls, { enableDamping: false, maxPolarAngle: 0.497 * Math.PI, minDistance: 0.15, maxDistance: Math.max(80, 4 * across) });
     this.follow = false;
   }
 

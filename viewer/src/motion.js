@@ -33,7 +33,7 @@ renderer.shadowMap.type = PCFShadowMap;
 byId("stage").prepend(renderer.domElement);
 const scene = new Scene();
 scene.background = new Color("#e9eef3");
-scene.fog = new Fog("#e9eef3", 14, 40);
+scene.fog = new Fog("#e9eef3", 14, 40); // put behind what is to be seen by haze()
 const sun = new DirectionalLight("#fff6e8", 2.2);
 scene.add(new HemisphereLight("#ffffff", "#b9c0c8", 2.0), sun, sun.target);
 
@@ -52,7 +52,7 @@ robots.forEach((robot, k) => scene.add(robot.group, paths[k], forces[k].group));
 if (marks.length) scene.add(...marks);
 
 const duration = Math.max(...data.motions.map((motion) => motion.times[motion.times.length - 1]));
-const eye = new Eye(renderer.domElement);
+const eye = new Eye(renderer.domElement, across);
 
 function subject() {
   const robot = robots[solid], low = new Vector3(Infinity, Infinity, Infinity), high = low.clone().negate();
@@ -77,6 +77,11 @@ sun.castShadow = fine;
 sun.shadow.mapSize.set(1024, 1024);
 sun.shadow.bias = -0.0008;
 
+function haze() {
+  const away = eye.camera.position.distanceTo(eye.controls.target) + 0.6 * across;
+  Object.assign(scene.fog, { near: Math.max(14, away), far: Math.max(40, 2.2 * away) });
+}
+
 function show(time) {
   robots.forEach((robot, k) => {
     robot.pose(time);
@@ -85,6 +90,7 @@ function show(time) {
   for (const mark of marks) mark.visible = time >= mark.userData.time;
   eye.track(robots[solid].place());
   light();
+  haze();
   renderer.render(scene, eye.camera);
   for (const plot of plots) plot.show(time);
 }
