@@ -81,7 +81,7 @@ def _(solution: Solution) -> Figure:
 
 @_facts.register
 def _(solution: Solution) -> dict[str, str]:
-    margins = {f"margin {name}": f"{margin:.1%}" for name, margin in solution.margins.items()}
+    margins = {f"margin {name}": f"{margin:z.1%}" for name, margin in solution.margins.items()}
     return {
         "problem": solution.problem.title,
         "holds": "yes" if solution.holds else "no",
@@ -121,7 +121,7 @@ def _(trajectory: Trajectory) -> dict[str, str]:
         "duration": f"{trajectory.duration:.4f} s",
         "length": f"{trajectory.path.length:.4f} m",
         "timing": trajectory.engine,
-        **{f"margin {name}": f"{margin:.1%}" for name, margin in trajectory.margins().items()},
+        **{f"margin {name}": f"{margin:z.1%}" for name, margin in trajectory.margins().items()},
     }
 
 
