@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -10,7 +11,12 @@ import trajopt
 
 def run(*arguments: str) -> str:
     told = subprocess.run(
-        [sys.executable, "-m", "trajopt", *arguments], capture_output=True, text=True, check=True
+        [sys.executable, "-m", "trajopt", *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+        # The shell is named, and not that of whatever runs the tests.
+        env={**os.environ, "_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"},
     )
     return told.stdout
 
