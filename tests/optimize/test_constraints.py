@@ -141,7 +141,7 @@ def test_swarms_keep_equalities(name: str, problem: Known, near: float) -> None:
         problem.bounds,
         constraints=problem.constraints,
         optimizer=name,
-        budget=Budget(20_000),
+        budget=Budget(50_000),
     )
     assert found.violation <= 1e-8
     assert found.fun == pytest.approx(problem.best, abs=near)
