@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 import sys
 from pathlib import Path
+from typing import Any
+
+from sphinx.application import Sphinx
 
 sys.path.insert(0, str(Path(__file__).parent))
 import reference_pages
@@ -15,26 +18,24 @@ project_copyright = author
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.viewcode", "sphinx_copybutton"]
 html_theme = "furo"
 html_title = "trajopt"
-exclude_patterns = ["README.md"]
 myst_heading_anchors = 3
 myst_enable_extensions = ["dollarmath"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_preserve_defaults = True
 toc_object_entries = False
-# Files that pages name but that are no pages of the site.
-myst_url_schemes = ("http", "https", "mailto")
 suppress_warnings = ["ref.python"]  # several rooms have a Motion
 
 
-def _as_written(app, what, name, obj, options, lines):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    """Bars and stars in docstrings are absolute values and products."""
+def _as_written(*event: Any) -> None:
+    """Bars and stars in docstrings, whose lines come last, are absolute values and products."""
+    lines = event[-1]
     for i, line in enumerate(lines):
         parts = re.split("(``.*?``)", line)
         lines[i] = "".join(p if p[:2] == "``" else re.sub(r"([|*])", r"\\\1", p) for p in parts)
 
 
-def setup(app):  # type: ignore[no-untyped-def]
+def setup(app: Sphinx) -> None:
     """Write the reference before sources are read."""
     app.connect("builder-inited", lambda app: reference_pages.write(Path(app.srcdir) / "reference"))
     app.connect("autodoc-process-docstring", _as_written)

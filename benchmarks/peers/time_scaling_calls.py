@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -75,9 +76,9 @@ def robot_rows(repetitions: int) -> list[Row]:
     for points, plain, proof in ((200, "5", ""), (1001, "8", "4"), (10_000, "15", "")):
         theirs, ours, sure = in_turn(
             [
-                lambda n=points: solved(spline, peer, n),  # type: ignore[misc]  # mypy infers no lambda default
-                lambda n=points: time_scale(path, LIMITS, robot=one, gridpoints=n, gap=None),  # type: ignore[misc]
-                lambda n=points: time_scale(path, LIMITS, robot=one, gridpoints=n),  # type: ignore[misc]
+                partial(solved, spline, peer, points),
+                partial(time_scale, path, LIMITS, robot=one, gridpoints=points, gap=None),
+                partial(time_scale, path, LIMITS, robot=one, gridpoints=points),
             ],
             repetitions if points < 5000 else max(3, repetitions // 5),
         )
@@ -195,8 +196,8 @@ def other_rows(repetitions: int) -> list[Row]:
         chords = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         ours, theirs = in_turn(
             [
-                lambda p=points: Path.through(p).length,  # type: ignore[misc]  # mypy infers no lambda default
-                lambda p=points, c=chords: CubicSpline(c, p, bc_type="natural"),  # type: ignore[misc]
+                partial(_length, points),
+                partial(CubicSpline, chords, points, bc_type="natural"),
             ],
             max(3, repetitions // 3),
         )
@@ -206,12 +207,16 @@ def other_rows(repetitions: int) -> list[Row]:
     return rows
 
 
+def _length(points: Array) -> float:
+    return Path.through(points).length
+
+
 def solve_rows(repetitions: int) -> list[Row]:
     problem = load_problem(PROBLEM)
     rows = []
     for name, goal in (("lattice", 8), ("pso", 40), ("lattice+ipopt+newton", 20)):
         (seconds,) = in_turn(
-            [lambda n=name: solve(problem, optimizer=n)],  # type: ignore[misc]  # mypy infers no lambda default
+            [partial(solve, problem, optimizer=name)],
             max(3, repetitions // 3),
         )
         rows.append(row(f"solve() by {name}", seconds, "", None, f"<= {goal} ms"))

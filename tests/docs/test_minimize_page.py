@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +16,10 @@ TEXT = (Path(__file__).parents[2] / "docs" / "minimize.md").read_text(encoding="
 
 
 def test_the_code_runs() -> None:
-    found: dict[str, object] = {}
+    found: dict[str, Any] = {}
     for code in re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL):
         exec(compile(code, "minimize.md", "exec"), found)
-    assert abs(found["found"].fun - 2.0) < 1e-4  # type: ignore[attr-defined]
+    assert abs(found["found"].fun - 2.0) < 1e-4
 
 
 def test_every_optimizer_is_there() -> None:

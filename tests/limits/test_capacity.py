@@ -10,6 +10,7 @@ from limits.space_statics import capacity_used, statics
 from limits.test_rows_in_space import driven
 
 from trajopt.errors import ArgumentError
+from trajopt.limits.capacity import _net
 from trajopt.limits.gradeability import grade_by_friction
 from trajopt.limits.slip import Slip
 from trajopt.paths.path import Path
@@ -104,3 +105,17 @@ def test_rules_are_named_and_fit_the_robot():
         one = robot(name)
         with pytest.raises(ArgumentError, match="least_norm or capacity"):
             Slip(0.5, rule="load").rows(along_of(one, Plane(0.0, 0.0), line, np.array([0.5])), one)
+
+
+@pytest.mark.parametrize("sides", [4, 8, 16, 32, 64])
+def test_no_direction_is_further_from_the_net_than_it_says(sides):
+    """Rows along the net are tightened by that cosine: a hole in it would let force through."""
+    net, cosine = _net(sides)
+    np.testing.assert_allclose(np.linalg.norm(net, axis=1), 1.0, atol=1e-12)
+    rng = np.random.default_rng(0)
+    anywhere = rng.standard_normal((200_000, 3))
+    poles = rng.standard_normal((20_000, 3)) * [1.0, 0.1, 0.1]  # where a spiral begins
+    for sample in (anywhere, poles):
+        sample = sample / np.linalg.norm(sample, axis=1)[:, None]
+        nearest = np.abs(sample @ net.T).max(axis=1)
+        assert nearest.min() >= cosine

@@ -39,12 +39,22 @@ def test_closed_forms(goal: list[float], way: float) -> None:
     assert bound(goal) <= way / V * (1 + 1e-9)
 
 
-def test_turning_towards_the_way_pays_where_it_is_far() -> None:
-    """Across at 30 deg: |vx| + |vy| is 1.366, or turn by 30 deg and back."""
+@pytest.mark.parametrize("yaw", [0.0, 0.4, -0.7])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_turning_towards_the_way_pays_where_it_is_far(side: float, yaw: float) -> None:
+    """Across at 30 deg: |vx| + |vy| is 1.366, or turn by 30 deg and back; whatever way it all lies."""
     far, near = 10.0, 0.1
-    across = far * np.array([np.cos(np.pi / 6), np.sin(np.pi / 6)])
-    assert bound([*across, 0.0]) == pytest.approx((far + np.pi / 3 * HALF) / V, rel=5e-3)
-    assert bound([*across * near / far, 0.0]) == pytest.approx(
+    angle = yaw + side * np.pi / 6
+    across = far * np.array([np.cos(angle), np.sin(angle)])
+    start = (0.0, 0.0, yaw)
+    best = (far + np.pi / 3 * HALF) / V
+    assert bound([*across, yaw], start=start) == pytest.approx(best, rel=5e-3)
+    assert bound([*across, yaw], start=start) <= best * (1 + 1e-9)
+    assert bound([*across, yaw], 1.001 * best, start) == 0.0  # that motion takes no more
+    assert (
+        bound([*across, yaw], 1.001 * far / V, start) > 0.0
+    )  # without the turns it does not get there
+    assert bound([*across * near / far, yaw], start=start) == pytest.approx(
         near * (np.sqrt(3) + 1) / 2 / V,
         rel=1.2e-2,  # the steps of p and q
     )

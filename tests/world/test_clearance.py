@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import shapely
 from shapely import affinity
 
 from trajopt.paths.path import Path
-from trajopt.world.clearance import TOLERANCE, path_clearance
+from trajopt.world.clearance import TOLERANCE, _travel, path_clearance
 from trajopt.world.keep_out import KeepOut, outside_of, without_holes
 from trajopt.world.obstacles import Circle, Wall
 from trajopt.world.scene import Scene
@@ -55,7 +57,7 @@ def test_overlap_is_negative_by_its_depth() -> None:
     path = Path.through([[0.0, 0.0], [3.0, 0.0]])
     found = path_clearance(path, OUTLINE, keep_out(shapely.box(1, 0.15, 2, 1)))
     assert found.distance == pytest.approx(-0.05, abs=1e-9)
-    assert "inside 'thing 0'" in str(found)
+    assert "0.050 m inside 'thing 0'" in str(found)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -77,6 +79,27 @@ def test_bound_and_distance_enclose_dense_samples(seed: int) -> None:
     assert found.bound <= dense
     assert found.distance <= dense + 1e-9 + TOLERANCE
     assert found.distance - found.bound <= TOLERANCE * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("free", [False, True])
+@pytest.mark.parametrize("reach", [0.0, 3.0])
+def test_travel_of_a_point_is_bounded_and_the_bound_is_near(free: bool, reach: float) -> None:
+    """Against the integral of speed and turning by 400 places an interval; near once these are short."""
+    rng = np.random.default_rng(3)
+    points = np.column_stack([np.arange(6) * 1.5, rng.uniform(-1, 1, 6)])
+    path = Path.through(points, heading=rng.uniform(-3, 3, 6) if free else None, turning_length=0.4)
+    knots, cubics = path.scaled_cubics
+    scale = path.turning_length if free else 0.0
+    for parts, most in ((1, np.inf), (8, 1.6), (64, 1.03)):
+        u = np.unique(np.concatenate([np.linspace(*ends, parts + 1) for ends in pairwise(knots)]))
+        bound = _travel(knots, cubics, scale, u[:-1], u[1:], reach)
+        t = np.linspace(u[:-1], u[1:], 401, axis=1)
+        place = path.position(t.ravel()).reshape(*t.shape, -1)[..., :2]
+        yaw = np.unwrap(path.yaw(t.ravel())).reshape(t.shape)
+        way = np.linalg.norm(np.diff(place, axis=1), axis=2).sum(axis=1)
+        true = way + reach * np.abs(np.diff(yaw, axis=1)).sum(axis=1)
+        assert (bound >= true * (1 - 1e-4)).all()
+        assert bound.sum() <= most * true.sum()
 
 
 def test_enough_ends_early_and_stays_a_bound() -> None:

@@ -138,7 +138,7 @@ class ParticleSwarm:
         """A swarm of one's own to drive: ``x = swarm.ask()``, evaluate, ``swarm.tell(cost,
         violation)``."""
         box = checked_bounds(bounds)
-        # Tuned with the inertia of ``local_best``: benchmarks/peers/swarms.py.
+        # Chosen with the inertia of ``local_best``; benchmarks/peers/swarms.py tells what it is worth.
         particles = self.particles or int(12 + 2 * len(box) ** 0.5)
         return Swarm.begin(
             SwarmRules(

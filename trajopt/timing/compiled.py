@@ -48,18 +48,6 @@ def compiled_profile(stages: Stages, start: float, end: float) -> Array:
     return sd2
 
 
-def forward_profile(stages: Stages, start: float) -> Array:
-    """(G,) s'^2 of driving on from s'^2 = ``start`` as fast as rows allow, whatever lies ahead; 0
-    from where they let nothing through."""
-    from trajopt.timing import kernel
-
-    highest = np.minimum(stages.sd2_max, SD2_CAP)
-    sd2 = np.empty(len(stages.s))
-    sets = np.column_stack([np.zeros_like(highest), highest])
-    kernel.fastest(stages.s, stages.a, stages.b, stages.c, sets, start, sd2)
-    return sd2
-
-
 def controllable_sets(stages: Stages, lowest: float, highest: float) -> Array:
     """(G, 2) least and greatest s'^2 at each gridpoint from which the end is reached in [lowest,
     highest].

@@ -11,6 +11,7 @@ import numpy as np
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.kernels import kernel
 from trajopt.paths.find import cell_at
+from trajopt.timing.reach import moment
 from trajopt.timing.spread import pace
 
 _POINTS = 5
@@ -54,25 +55,6 @@ def sigma_powers(
 
 
 @kernel(nogil=True)
-def _moment(h: float, y: float, first: float, last: float, after: float) -> tuple[float, float]:
-    """As ``reach.moments``: sigma gained and sigma'."""
-    slope = (last - first) / h
-    z, w = slope * after * after, np.sqrt(max(y, 0.0))
-    if abs(z) < 1e-2:
-        sine = after * (1 + z / 6 * (1 + z / 20 * (1 + z / 42 * (1 + z / 72))))
-        half = after * after / 2 * (1 + z / 12 * (1 + z / 30 * (1 + z / 56 * (1 + z / 90))))
-        cosine = 1 + slope * half
-    else:
-        r = np.sqrt(abs(slope))
-        if z > 0:
-            sine, cosine = np.sinh(r * after) / r, np.cosh(r * after)
-        else:
-            sine, cosine = np.sin(r * after) / r, np.cos(r * after)
-        half = (cosine - 1) / slope
-    return min(max(w * sine + first * half, 0.0), h), max(w * cosine + first * sine, 0.0)
-
-
-@kernel(nogil=True)
 def places(
     u: Array,
     d: Array,
@@ -95,7 +77,7 @@ def places(
         i = cell_at(starts, len(d), times[k], i)
         after = min(max(times[k] - starts[i], 0.0), starts[i + 1] - starts[i])
         left[k] = -1
-        gained, speed[k] = _moment(d[i], y[i], first[i], last[i], after)
+        gained, speed[k], _ = moment(d[i], y[i], first[i], last[i], after)
         if not fits[i]:
             found[k], left[k] = gained, i
             continue

@@ -286,27 +286,32 @@ def cell_times(d: Array, y: Array, u0: Array, u1: Array) -> Array:
 
 
 @kernel(nogil=True)
+def moment(d: float, y: float, u0: float, u1: float, after: float) -> tuple[float, float, float]:
+    """Sigma gained, sigma' and sigma'' so long after a cell was entered."""
+    slope = (u1 - u0) / d
+    z, w = slope * after * after, np.sqrt(max(y, 0.0))
+    if abs(z) < 1e-2:
+        sine = after * (1 + z / 6 * (1 + z / 20 * (1 + z / 42 * (1 + z / 72))))
+        half = after * after / 2 * (1 + z / 12 * (1 + z / 30 * (1 + z / 56 * (1 + z / 90))))
+        cosine = 1 + slope * half
+    else:
+        r = np.sqrt(abs(slope))
+        if z > 0:
+            sine, cosine = np.sinh(r * after) / r, np.cosh(r * after)
+        else:
+            sine, cosine = np.sin(r * after) / r, np.cos(r * after)
+        half = (cosine - 1) / slope
+    gained = min(max(w * sine + u0 * half, 0.0), d)
+    return gained, max(w * cosine + u0 * sine, 0.0), u0 + slope * gained
+
+
+@kernel(nogil=True)
 def moments(
     d: Array, y: Array, u0: Array, u1: Array, cells: IndexArray, times: Array
 ) -> tuple[Array, Array, Array]:
     """Sigma gained, sigma' and sigma'' at times (M,) after cells (M,) were entered."""
     gained, speed, pull = np.empty(len(times)), np.empty(len(times)), np.empty(len(times))
     for n in range(len(times)):
-        i, after = cells[n], max(times[n], 0.0)
-        slope = (u1[i] - u0[i]) / d[i]
-        z, w = slope * after * after, np.sqrt(max(y[i], 0.0))
-        if abs(z) < 1e-2:
-            sine = after * (1 + z / 6 * (1 + z / 20 * (1 + z / 42 * (1 + z / 72))))
-            half = after * after / 2 * (1 + z / 12 * (1 + z / 30 * (1 + z / 56 * (1 + z / 90))))
-            cosine = 1 + slope * half
-        else:
-            r = np.sqrt(abs(slope))
-            if z > 0:
-                sine, cosine = np.sinh(r * after) / r, np.cosh(r * after)
-            else:
-                sine, cosine = np.sin(r * after) / r, np.cos(r * after)
-            half = (cosine - 1) / slope
-        gained[n] = min(max(w * sine + u0[i] * half, 0.0), d[i])
-        speed[n] = max(w * cosine + u0[i] * sine, 0.0)
-        pull[n] = u0[i] + slope * gained[n]
+        i = cells[n]
+        gained[n], speed[n], pull[n] = moment(d[i], y[i], u0[i], u1[i], max(times[n], 0.0))
     return gained, speed, pull
