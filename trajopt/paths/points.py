@@ -71,7 +71,8 @@ def interpolated(
     )
     if len(given) != len(array):
         raise ArgumentError("knots", len(given), f"one knot a point ({len(array)})")
-    basis = SplineBasis(given, *(end is not None for end in ends.values()), closed=bool(closed))
+    first, last = (end is not None for end in ends.values())
+    basis = SplineBasis(given, first, last, bool(closed))
     dimensions = array.shape[1:]
     rates = [
         finite_numbers(name, end, f"{dimensions[0]} numbers", dimensions)
