@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -32,3 +33,25 @@ def test_short_help_is_help() -> None:
 
 def test_shells_can_complete() -> None:
     assert "TRAJOPT_COMPLETE" in run("--show-completion", "bash")
+
+
+def test_results_are_told_as_json_alone() -> None:
+    found = json.loads(run("explain", "problems/powerbot/experiment_4.toml", "--json"))
+    assert found["gap"] <= 1e-3
+    assert {part["limit"] for part in found["stretches"]} <= {
+        one["limit"] for one in found["limits"]
+    }
+    solved = json.loads(run("solve", "problems/smdw/table_5_3.toml", "--json"))
+    assert solved["holds"]
+
+
+def test_quiet_commands_print_nothing() -> None:
+    assert run("explain", "problems/powerbot/experiment_4.toml", "--quiet") == ""
+
+
+def test_verbose_commands_say_where_an_error_comes_from() -> None:
+    command = [sys.executable, "-m", "trajopt", "explain", "nowhere.toml"]
+    for more, expected in ((["-v"], True), ([], False)):
+        told = subprocess.run([*command, *more], capture_output=True, text=True).stderr
+        assert ("Traceback" in told) == expected
+        assert "error: nowhere.toml" in told

@@ -62,6 +62,7 @@ def solve(
     from trajopt.optimize.base import Status
     from trajopt.pipeline import solve as solve_problem
     from trajopt.problem import load_problem
+    from trajopt.report.run_folder import solution_summary
     from trajopt.report.tables import solution_table
 
     kind = picture_kind(pictures, format_)
@@ -83,6 +84,7 @@ def solve(
             progress=bar.update,
         )
     console.print(solution_table(solution))
+    console.facts(solution_summary(solution, seed=seed))
     if out is not None:
         _write(solution, out, seed, kind)
     if not solution.holds:
@@ -108,7 +110,7 @@ def validate(
 ) -> None:
     """Drive a saved solution in a physics engine with real rollers and measure the deviation."""
     from trajopt.pipeline import validate as validate_trajectory
-    from trajopt.report.run_folder import read_solution, write_validation
+    from trajopt.report.run_folder import read_solution, validation_summary, write_validation
     from trajopt.report.tables import validation_table
 
     kind = picture_kind(pictures, format_)
@@ -129,6 +131,7 @@ def validate(
             seed=seed,
         )
     console.print(validation_table(report, solution.problem.robot))
+    console.facts(validation_summary(report, solution.problem.robot))
     write_validation(report, folder, solution.problem.robot)
     if kind:
         from trajopt.report.pictures import save_physics_picture

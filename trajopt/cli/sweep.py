@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from trajopt.cli.shared import FormatOption, console, leaving, picture_kind
+from trajopt.cli.shared import FormatOption, console, leaving, picture_kind, switched
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -57,6 +57,7 @@ Tls = Annotated[
 
 
 @app.command()
+@switched
 def run(
     sweep_file: SweepFile,
     store: StoreOption = None,
@@ -87,6 +88,7 @@ def run(
 
 
 @app.command("retry-failed")
+@switched
 def retry_failed(
     sweep_file: SweepFile,
     store: StoreOption = None,
@@ -110,6 +112,7 @@ def retry_failed(
 
 
 @app.command()
+@switched
 def submit(
     sweep_file: SweepFile,
     store: StoreOption = None,
@@ -157,6 +160,7 @@ def submit(
 
 
 @app.command()
+@switched
 def status(store: StorePath) -> None:
     """Cases by status, the last runs, and the commonest errors."""
     from trajopt.sweeps.store import open_store
@@ -190,6 +194,7 @@ def status(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def show(
     store: StorePath, case: Annotated[str, typer.Argument(help="first digits of a case")]
 ) -> None:
@@ -244,6 +249,7 @@ def report(
 
 
 @app.command()
+@switched
 def compact(store: StorePath) -> None:
     """Merge the parts of a store into large ones."""
     from trajopt.sweeps.store import open_store
@@ -253,6 +259,7 @@ def compact(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def verify(store: StorePath) -> None:
     """Read everything in a store and compare it with its checksums; exit code 1 for damage."""
     from trajopt.sweeps.store import open_store
@@ -267,6 +274,7 @@ def verify(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def repair(store: StorePath) -> None:
     """Take out what is damaged, with lists of the cases to run again, into <store>/damaged."""
     from trajopt.sweeps.upkeep import repair as repair_store
@@ -278,6 +286,7 @@ def repair(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def export(
     store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]
 ) -> None:
@@ -303,6 +312,7 @@ def export(
 
 
 @app.command()
+@switched
 def plot(
     store: StorePath,
     out: Annotated[Path, typer.Argument(help="picture to write (*.png, *.pdf, *.svg)")],
