@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 import trajopt
-from trajopt.cli import bench, paths, robot, search, sweep, view
+from trajopt.cli import bench, examples, paths, robot, search, sweep, view
 from trajopt.cli.shared import INTERRUPTED, leaving, switched
 from trajopt.errors import TrajoptError
 
@@ -34,6 +34,7 @@ for command in (
     paths.compare,
     search.schema,
     robot.robot,
+    examples.examples,
     sweep.report,
     view.view,
 ):
