@@ -235,10 +235,10 @@ def test_choices_are_texts_of_a_list(wrong: Any) -> None:
     for refused in (
         lambda: time_scale(PATH, SPEED, engine=wrong),
         lambda: time_scale(PATH, SPEED, too_fast=wrong),
-        lambda: LIMITS["slip"](0.5, rule=wrong if wrong is not None else 0),
+        lambda: LIMITS["slip"](0.5, rule=0 if wrong is None else wrong),
         lambda: Path.through([[0, 0], [1, 0], [1, 1]], closed=wrong),
-        lambda: time_scale(PATH, [Speed(1.0, name=wrong if wrong != "none" else 0)]),  # type: ignore[arg-type]
-        lambda: time_scale_many(PATH, SPEED, executor=wrong or 0),
+        lambda: time_scale(PATH, [Speed(1.0, name=[wrong])]),  # type: ignore[arg-type]
+        lambda: time_scale_many(PATH, SPEED, executor=[wrong]),
     ):
         with pytest.raises(ArgumentError):
             refused()
