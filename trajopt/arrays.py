@@ -47,7 +47,7 @@ def as_numbers(argument: str, value: Any, expected: str, shape: Shape | None = N
     saying what was ``expected``."""
     try:
         if isinstance(value, np.ma.MaskedArray):
-            value = value.astype(np.float64).filled(np.nan)
+            value = np.ma.filled(value.astype(np.float64), np.nan)
         array = np.asarray(value)
         if array.dtype == object and all(_is_real(v) for v in array.flat):  # whole ones of any size
             array = array.astype(np.float64)
