@@ -128,3 +128,9 @@ def require_choice(argument: str, value: Any, choices: Iterable[str]) -> None:
     known = tuple(choices)
     if not (isinstance(value, str) and value in known):
         raise ArgumentError(argument, value, "one of " + ", ".join(known))
+
+
+def require_flag(argument: str, value: Any) -> None:
+    """Raises ArgumentError unless ``value`` is true or false."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ArgumentError(argument, value, "true or false")
