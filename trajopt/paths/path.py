@@ -82,6 +82,7 @@ class Path:
         Raises ArgumentError for fewer than two points (a lap: three), neighbours that coincide, or
         numbers that are not finite.
         """
+        arrays.require_flag("closed", closed)
         array = finite_numbers("points", points, "shape (N, 2) or (N, 3) with N >= 2")
         if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] not in (2, 3):
             raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
