@@ -88,6 +88,7 @@ class Path:
         Raises ArgumentError for fewer than two points (a lap: three), neighbours that coincide, or
         numbers that are not finite.
         """
+        arrays.require_flag("closed", closed)
         ends = {"start_direction": start_direction, "end_direction": end_direction}
         return cls(
             *interpolated(points, heading, knots, ends, turning_length, closed), turning_length

@@ -20,7 +20,7 @@ from trajopt.timing.track import Track, track
 from trajopt.world.ground import Ground
 
 _JUMP = 1e-2  # of a wheel speed, at a line of the ground; chosen: as much as tyres give way
-_FASTEST = 1e6  # m/s, chosen: beyond it is an input error, and squares stay far from overflow
+FASTEST = 1e6  # m/s, chosen: beyond it is an input error, and squares stay far from overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +79,27 @@ class Job:
                 )
 
 
+def require_given(path: object, limits: object, robot: object, ground: object) -> None:
+    """Raises ArgumentError for what is no path, no limits with different names, no robot, or no
+    ground."""
+    if not isinstance(path, Path):
+        raise ArgumentError("path", path, "a Path")
+    if not isinstance(limits, (list, tuple)):
+        raise ArgumentError("limits", limits, "a list or tuple of limits")
+    for limit in limits:
+        if not hasattr(limit, "rows") or isinstance(limit, type):
+            raise ArgumentError("limits", limit, "limits, as Speed(1.0)")
+        if not isinstance(limit.name, str):
+            raise ArgumentError("limits", limit, "limits whose name is a text")
+    if robot is not None and not isinstance(robot, Robot):
+        raise ArgumentError("robot", robot, "a Robot, as robot('car'), or None")
+    if ground is not None and not hasattr(ground, "check"):
+        raise ArgumentError("ground", ground, "the shape of the ground, as Flat(), or None")
+    names = [limit.name for limit in limits]
+    if len(set(names)) < len(names):
+        raise ArgumentError("limits", names, "limits with different names (pass name=...)")
+
+
 def checked_job(
     path: Path,
     limits: Sequence[Limit],
@@ -90,23 +111,12 @@ def checked_job(
     start: tuple[ArrayLike, Mapping[str, float] | None] = ((), None),
 ) -> Job:
     """The checked arguments. Raises ArgumentError."""
-    if not isinstance(path, Path):
-        raise ArgumentError("path", path, "a Path")
-    if not isinstance(limits, (list, tuple)) or not limits:
+    require_given(path, limits, robot, ground)
+    if not limits:
         raise ArgumentError("limits", limits, "a list or tuple of at least one limit")
-    for limit in limits:
-        if not hasattr(limit, "rows") or isinstance(limit, type):
-            raise ArgumentError("limits", limit, "limits, as Speed(1.0)")
-    if robot is not None and not isinstance(robot, Robot):
-        raise ArgumentError("robot", robot, "a Robot, as robot('car'), or None")
-    if ground is not None and not hasattr(ground, "check"):
-        raise ArgumentError("ground", ground, "the shape of the ground, as Flat(), or None")
-    names = [limit.name for limit in limits]
-    if len(set(names)) < len(names):
-        raise ArgumentError("limits", names, "limits with different names (pass name=...)")
     for argument, speed in zip(("start_speed", "end_speed"), speeds, strict=True):
-        if require_not_negative(argument, speed, "m/s") > _FASTEST:
-            raise ArgumentError(argument, speed, f"a path speed from 0 to {_FASTEST:g} m/s")
+        if require_not_negative(argument, speed, "m/s") > FASTEST:
+            raise ArgumentError(argument, speed, f"a path speed from 0 to {FASTEST:g} m/s")
     require_engine(engine)
     bent = [limit.name for limit in limits if not is_linear(limit)]
     if bent and not is_second_order(engine):
