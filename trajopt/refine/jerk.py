@@ -66,12 +66,12 @@ def limit_jerk(
             (float(trajectory.sd[0]), float(trajectory.sd[-1])),
             "a motion from rest to rest",
         )
-    halts = trajectory.s[1:-1][trajectory.sd[1:-1] == 0]
-    if len(halts):
-        raise ArgumentError("trajectory", halts.tolist(), "a motion that does not stop on the way")
     if trajectory.rests:
         expected = "a motion whose wheels need not turn at rest on the way"
         raise ArgumentError("trajectory", [rest.s for rest in trajectory.rests], expected)
+    halts = trajectory.s[1:-1][trajectory.sd[1:-1] == 0]
+    if len(halts):
+        raise ArgumentError("trajectory", halts.tolist(), "a motion that does not stop on the way")
     used = trajectory.limits if limits is None else limits
     source = replace(trajectory, limits=used)
     found: list[SmoothMotion] = []
