@@ -32,10 +32,10 @@ _STARTS = (
     1.0,
     1.3,
 )  # times the stretched time-optimal motion: the program has several optima; chosen
-_ATTEMPTS = ((False, 2), (True, 3))
+_ATTEMPTS = ((False, 1), (True, 3))
 _PARTS = 3  # an interval is split into; chosen
 _SPLIT_ABOVE = 1e-3  # relative violation that splits an interval, or puts a row in; chosen
-_NEAR = 0.4  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
+_NEAR = 0.75  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
 
 
 def limit_jerk(
