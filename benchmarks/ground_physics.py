@@ -48,7 +48,7 @@ SPEED, LENGTH, BEND = 1.0, 2.0, 0.08  # m/s, m, m: a slight S in two metres
 # which know a suspension, are too hopeful
 HILLS, HILL = 0.3, 20.0
 LOAD = (
-    0.1  # of an even share, left on every wheel: PowerBot would brake with its castors in the air
+    0.2  # of an even share, left on every wheel: PowerBot would brake with its castors in the air
 )
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
 LEFT = "left physics"
