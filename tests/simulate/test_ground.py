@@ -20,6 +20,8 @@ from benchmarks.ground_physics import (
     tip_slope,
     tipped,
 )
+from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
 from trajopt.robots import robot
 from trajopt.robots.steering import steering_of
@@ -31,6 +33,7 @@ from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import stage
 from trajopt.simulate.standing import standing
 from trajopt.simulate.stepping import open_session
+from trajopt.timing.scaling import time_scale
 from trajopt.world.ground import Ground
 from trajopt.world.laid import lay
 from trajopt.world.mesh import Mesh
@@ -147,6 +150,17 @@ def test_steering_of_wheels_and_of_joints(name: str) -> None:
 @pytest.mark.parametrize(("name", "place"), [("powerbot", "contour"), ("car", "rough")])
 def test_a_sample_drives_as_planned(name: str, place: str) -> None:
     as_planned(name, place, 0.6, "mujoco")
+
+
+def test_powerbot_keeps_its_way_across_a_slope() -> None:
+    """8 deg: it was 7.9 m off once, planned as on level ground."""
+    across = Plane(math.radians(8), math.pi / 2)
+    line = Path.through([[0, 0], [2, 0]])
+    limits = (Speed(1.0), Slip(0.332))
+    found = time_scale(line, limits, robot=robot("powerbot"), ground=across)
+    report = driven(found, 0.332, "pybullet")
+    assert report.final_distance < 0.02
+    assert report.slip_share < 0.01
 
 
 def as_planned(name: str, place: str, friction: float, engine: str) -> None:

@@ -53,7 +53,7 @@ class SpecBuilder:
         self.meshes: dict[Shape, str] = {}
         spec.compiler.balanceinertia, spec.compiler.degree = False, False
         spec.option.timestep, spec.option.iterations = options.step, options.iterations
-        self.smooth = not stage.broken
+        self.smooth, self.uneven = not stage.broken, stage.uneven
         if self.smooth:
             spec.option.impratio = FRICTION_IMPEDANCE
         spec.option.gravity = [0.0, 0.0, -STANDARD_GRAVITY]
@@ -159,12 +159,12 @@ class SpecBuilder:
         its own. Where it has that of a soft contact, wheels slide outward in bends: MuJoCo leaves
         out that directions of friction turn, and brings the slip to rest at that rate only.
 
-        Balls of a roller hold along its axis alone. They differ in radius, so that two which touch
+        Soft balls of a roller hold along its axis alone. They differ in radius, so that two which touch
         at once would slide against each other across it and have less left to hold along (measured:
         up to a third). A capsule without length is a ball whose contacts MuJoCo lays along its axis.
         """
         grip = across = link.grip * self.friction
-        if ball and link.joint.role == "roller":
+        if ball and self.uneven and link.joint.role == "roller":
             geom.type, across = self.mujoco.mjtGeom.mjGEOM_CAPSULE, NO_FRICTION
             geom.size = [geom.size[0], SHORT, 0.0]
         pair = self.spec.add_pair(name=f"meet_{geom.name}")

@@ -82,7 +82,7 @@ class MuJoCo:
             ) from error
         session = _Session(mujoco, compiled, model, stage)
         if not stage.broken:
-            session.soften()
+            session.soften(stage.uneven)
         session.place(start)
         yield session
 
@@ -132,8 +132,8 @@ class _Session:
         for i in range(len(stage.solids)):
             self.solid_of[compiled.geom(f"solid_{i}").id] = i
 
-    def soften(self) -> None:
-        """Makes tyres and rollers as soft as ``tyres.give`` says.
+    def soften(self, uneven: bool) -> None:
+        """Makes tyres, and on ``uneven`` ground rollers, as soft as ``tyres.give`` says.
 
         Solref's direct form k, b acts in acceleration, through the regularisation R = (1 - d)/d A of
         a body with the inverse weight A: force = (k r + b v) / ((1 - d) A), with d the impedance.
@@ -142,8 +142,9 @@ class _Session:
         compiled, kinds = self.compiled, self.mujoco.mjtGeom
         sags = {int(kinds.mjGEOM_SPHERE): TYRE_SAG, int(kinds.mjGEOM_CAPSULE): RIM_SAG}
         for pair, geom in enumerate(compiled.pair_geom2):
-            soft = give(self.model, self.model.links[self.link_of[geom]])
-            if soft is None:
+            link = self.model.links[self.link_of[geom]]
+            soft = give(self.model, link)
+            if soft is None or (link.joint.role == "roller" and not uneven):
                 continue
             kind = int(compiled.geom_type[geom])
             contacts = 2.0 if kind == kinds.mjGEOM_CAPSULE else 1.0  # one at each end

@@ -174,7 +174,7 @@ class _Session:
             bullet.resetJointState(self.robot, self.joint[link], fold(float(angle)), 0.0)
             self.offset[link] = float(angle - fold(float(angle)))
         self.grip = Grip(
-            bullet, model, self.robot, self.joint, stage.scene.friction, rollers=not stage.broken
+            bullet, model, self.robot, self.joint, stage.scene.friction, rollers=stage.uneven
         )
         self.turns = np.array([self.offset[link] for link in model.targets])
         self.before: Array | None = None
@@ -215,8 +215,8 @@ class _Session:
             rollingFriction=0.0, restitution=0.0,
         )  # fmt: skip
         rolls, soft = link.joint.role == "roller", give(self.model, link)
-        if rolls and self.stage.broken:
-            soft = None  # rollers are what meets an edge
+        if rolls and not self.stage.uneven:
+            soft = None
         elif rolls:  # friction along the axis alone: light rollers would never get up to speed
             bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
         if soft is not None:

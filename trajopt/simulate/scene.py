@@ -64,6 +64,13 @@ class Stage:
         return rough or any(isinstance(o, Step) for o in self.scene.obstacles)
 
     @property
+    def uneven(self) -> bool:
+        """Whether rollers have to give way to share the load: on slopes and hills, not on level
+        ground, and not at steps, where rollers are what meets an edge."""
+        level = self.plane is not None and self.plane.slope == 0.0
+        return not (level or self.broken)
+
+    @property
     def plates(self) -> bool:
         """Whether wheels meet planes that move along with them, instead of plates and ``field``."""
         return self.plane is None and not self.broken
