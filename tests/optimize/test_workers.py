@@ -97,9 +97,7 @@ def test_workers_of_a_dask_cluster() -> None:
 def test_two_workers_halve_the_time_within_15_percent(kind: str, d: int) -> None:
     def seconds(workers: Any) -> float:
         box, budget = [[-2.0, 3.0]] * d, Budget(100)
-        return minimize(
-            fifty, box, optimizer="pso", workers=workers, budget=budget, seed=3
-        ).seconds
+        return minimize(fifty, box, optimizer="pso", workers=workers, budget=budget, seed=3).seconds
 
     if kind == "processes":
         both = min(seconds(2) for _ in range(2))  # the machine may be busy

@@ -32,7 +32,7 @@ class Answers:
         except Exception as error:
             self.count(n, f"{type(error).__name__}: {error}")
             return Evaluation(np.full(n, np.inf), np.full(n, np.inf))
-        total = np.add.reduce(cost) + np.add.reduce(violation)
+        total = cost.dot(cost) + violation.dot(violation)
         if values is not None:
             total = total + values.sum()
         if math.isfinite(total):  # then each is; the usual case, quick

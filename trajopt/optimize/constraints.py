@@ -115,8 +115,10 @@ def of_casadi(item: Any) -> bool:
 
 def numbers(value: Any, who: str) -> Array:
     """As an array of real numbers. Raises ValueError for None, text, masked values and the like."""
-    if type(value) is float:  # the usual case, and quick
+    if type(value) is float:  # the usual cases, and quick
         return np.float64(value)  # type: ignore[return-value]
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
     if value is None:
         raise ValueError(f"{who} returned None; does it end without 'return'?")
     if np.ma.is_masked(value):

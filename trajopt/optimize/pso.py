@@ -18,7 +18,6 @@ Velocities start at zero. w_k = w, or falls linearly from ``inertia`` to ``final
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
@@ -198,8 +197,12 @@ class ParticleSwarm:
 def _share(run: Run, swarm: Swarm) -> Callable[[], float]:
     """What tells the share of the budget that is used up: by iterations, not by what else counts as
     an evaluation, so that workers give the same bits."""
+    if swarm.rules.final_inertia is None:
+        return lambda: 0.0
     begun, most = swarm.iteration, run.remaining() / len(swarm.x)
-    seconds = run.budget.seconds or math.inf
+    if run.budget.seconds is None:
+        return lambda: min(1.0, (swarm.iteration - begun) / most)
+    seconds = run.budget.seconds
     return lambda: min(1.0, max((swarm.iteration - begun) / most, run.elapsed / seconds))
 
 
