@@ -246,6 +246,9 @@ class Run(Limited):
                 status, said = stop.status, stop.said
             except KeyboardInterrupt:
                 status, said = Status.INTERRUPTED, ""
+            except BaseException:  # sys.exit, say: at least the state is kept
+                self.checkpoint(now=True)
+                raise
         seconds = self.elapsed
         self.checkpoint(now=True)
         x, fun, violation = self.judged()

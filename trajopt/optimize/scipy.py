@@ -143,7 +143,8 @@ class ScipyLocal:
             return optimize.NonlinearConstraint(values, *limits[:, kind], **extra)
 
         equal = limits[0] == limits[1]
-        return {"constraints": [constraint(kind) for kind in (equal, ~equal) if kind.any()]}
+        kept = ~equal & np.isfinite(limits).any(axis=0)  # SciPy fails on those without a limit
+        return {"constraints": [constraint(kind) for kind in (equal, kept) if kind.any()]}
 
     def _settled(self, optimize: Any, run: Run, unit: Array) -> bool:
         """Whether a method that gave up had nothing left to gain: the cost's slope is one of what

@@ -148,7 +148,7 @@ def minimize(
         if not getattr(method, "saves", False):
             able = ", ".join(n for n in OPTIMIZERS if getattr(optimizer_named(n), "saves", False))
             raise ArgumentError("state", str(state), f"None for {method.name}: only {able} save")
-        kept = StateFile(state, method, box)
+        kept = StateFile(state, method, asked, box)
     if hasattr(asked, "prepare"):
         asked.prepare()  # compiles, say, before the clock runs
     pool = Pool.of(workers, asked)
@@ -156,7 +156,8 @@ def minimize(
         run = Run(asked, box, budget or Budget(), progress, callback, pool, kept)
         rng = np.random.default_rng(seed)
         note = getattr(asked, "impossible", str)()
-        return run.finish(method.name, lambda: method.search(run, start, rng), note)
+        name = str(optimizer) if optimizer in tuple(OPTIMIZERS) else method.name
+        return run.finish(name, lambda: method.search(run, start, rng), note)
     finally:
         if pool is not None:
             pool.close()

@@ -47,7 +47,7 @@ class SwarmRules:
 class Swarm:
     """Positions ``x``, velocities ``v``, own bests; mutable by nature. ``idle``: iterations since
     it improved; ``used``: share of the budget that is used up, by which the inertia falls where the
-    rules have no horizon."""
+    rules have no horizon; ``seconds``: how long it has searched."""
 
     rules: SwarmRules
     bounds: Array
@@ -61,6 +61,7 @@ class Swarm:
     idle: int = 0
     level: float = FEASIBLE  # violation up to which candidates count as feasible
     used: float = 0.0
+    seconds: float = 0.0
     _reached: tuple[float, float] = (np.inf, np.inf)
 
     def __post_init__(self) -> None:
@@ -174,6 +175,7 @@ class Swarm:
             "iteration": self.iteration,
             "idle": self.idle,
             "level": self.level,
+            "seconds": self.seconds,
             "rng": self.rng.bit_generator.state,
             **{name: getattr(self, name) for name in _ARRAYS},
         }
@@ -186,7 +188,7 @@ class Swarm:
             getattr(self, name)[:] = kept[name]
         self.rng.bit_generator.state = kept["rng"]
         self.iteration, self.idle = kept["iteration"], kept["idle"]
-        self.level = kept["level"]
+        self.level, self.seconds = kept["level"], kept["seconds"]
         self.__post_init__()
 
     def save(self, path: str | Path) -> None:
