@@ -34,6 +34,16 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
+def loaded(run: Run) -> Any:
+    """scipy.optimize; the clock and the threads are looked at when all that it takes is there."""
+    import scipy.linalg
+    from scipy import optimize
+
+    assert scipy.linalg
+    run.constructed()
+    return optimize
+
+
 @dataclass(frozen=True)
 class ScipyLocal:
     """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from
@@ -64,11 +74,7 @@ class ScipyLocal:
 
     def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         """Search from each start in turn."""
-        import scipy.linalg  # loaded before the clock and the threads are looked at
-        from scipy import optimize
-
-        assert scipy.linalg
-        run.constructed()
+        optimize = loaded(run)
         starts = Starts(run)
         for start in starting_points(run, x0, rng, self.starts):
             unit = (start - run.bounds[:, 0]) / run.width
@@ -186,11 +192,7 @@ class LeastSquares:
 
     def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         """Search from each start in turn."""
-        import scipy.linalg
-        from scipy import optimize
-
-        assert scipy.linalg
-        run.constructed()
+        optimize = loaded(run)
         objective = cast(ResidualObjective, run.objective)
         gains, (low, high) = objective.residual_gains(), run.bounds.T
         starts = Starts(run)
@@ -224,28 +226,3 @@ class LeastSquares:
             run.propose(result.x)
             starts.ended(bool(result.success), str(result.message))
         return starts.verdict()
-
-
-def slsqp() -> ScipyLocal:
-    """Sequential least-squares programming."""
-    return ScipyLocal("SLSQP")
-
-
-def l_bfgs_b() -> ScipyLocal:
-    """Limited-memory BFGS within bounds."""
-    return ScipyLocal("L-BFGS-B")
-
-
-def trust_constr() -> ScipyLocal:
-    """Trust-region method for constrained problems."""
-    return ScipyLocal("trust-constr")
-
-
-def cobyqa() -> ScipyLocal:
-    """COBYQA [ragonneau2024]: quadratic models without derivatives, with constraints."""
-    return ScipyLocal("COBYQA")
-
-
-def nelder_mead() -> ScipyLocal:
-    """Simplex search within bounds."""
-    return ScipyLocal("Nelder-Mead")
