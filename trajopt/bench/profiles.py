@@ -108,7 +108,7 @@ def expected_running_time(
     spent, success = np.where(np.isfinite(times), times, used), np.isfinite(times)
     picks = rng.integers(len(times), size=(draws, len(times)))
     wins = success[picks].sum(axis=1)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         sample = spent[picks].sum(axis=1) / wins
     low, high = np.sort(sample)[[int(0.025 * draws), min(int(0.975 * draws), draws - 1)]]
     value = spent.sum() / success.sum() if success.any() else np.inf

@@ -81,8 +81,13 @@ class BenchTables:
         return tuple(sorted({str(row["optimizer"]) for row in self.rows}))
 
     @property
-    def seeds(self) -> int:
-        return len({row["seed"] for row in self.rows})
+    def seeds(self) -> str:
+        """How many seeds problems have: "5", or "3 to 5"."""
+        seen: dict[Any, set[Any]] = {}
+        for row in self.rows:
+            seen.setdefault(row["problem"], set()).add(row["seed"])
+        counts = sorted({len(seeds) for seeds in seen.values()})
+        return " to ".join(map(str, dict.fromkeys((counts[0], counts[-1]))))
 
     @cached_property
     def leaders(self) -> tuple[str, ...]:
@@ -121,7 +126,8 @@ class BenchTables:
 
     def spread(self, problem: str) -> float:
         """``scale`` of a problem by its name."""
-        row = next(row for row in self.done if row["problem"] == problem)
+        rows = (row for row in (*self.done, *self.others) if row["status"] == "done")
+        row = next(row for row in rows if row["problem"] == problem)
         return self.scale(problem, row)
 
     def scale(self, problem: str, row: Row) -> float:

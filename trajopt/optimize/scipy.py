@@ -49,7 +49,8 @@ class ScipyLocal:
     """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from
     random points.
 
-    ``starts``: number of starts; later ones are drawn uniformly from the bounds.
+    ``starts``: number of starts; later ones are drawn uniformly from the bounds. COBYQA
+    [ragonneau2024] makes quadratic models without derivatives, with constraints.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()

@@ -70,18 +70,20 @@ class ScipyGlobal:
             )
             run.nit = int(result.nit)
             return _flagged(result), str(result.message[0])
-        if x0 is not None:
-            run.at(x0)
-        return self._divide(optimize, run, cost)
+        return self._divide(optimize, run, x0, cost)
 
     def _divide(
-        self, optimize: Any, run: Run, cost: Callable[[Array], float]
+        self, optimize: Any, run: Run, x0: Array | None, cost: Callable[[Array], float]
     ) -> tuple[Status, str]:
         ended: list[Exception] = []
 
         def kept(x: Array) -> float:  # what is raised must not pass SciPy's C code
             if not ended:
                 try:
+                    if run.nfev == 0:
+                        run.constructed()  # room for all rectangles: 60 ms for a million
+                        if x0 is not None:
+                            run.at(x0)
                     return cost(x)
                 except Exception as stop:
                     ended.append(stop)
