@@ -1,7 +1,7 @@
 """Bring docs/pso_vs_gradient.md up to date with the rows of a benchmark.
 
 Run as ``python -m benchmarks.pso_vs_gradient_page [STORE]`` after ``trajopt bench
-benchmarks/pso_vs_gradient.toml``. Replaces what stands between the markers of the page (tables) and
+benchmarks/pso_vs_gradient.toml`` and ``python -m benchmarks.peers.pso_statistics``. Replaces what stands between the markers of the page (tables) and
 its three pictures; the words around them are written by hand, so read them again. The whole report
 (CSV, SVG, every table) goes to STORE/report.
 """
@@ -13,14 +13,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from benchmarks.common import ROOT
-from trajopt.bench.page import (
-    answer_lines,
-    peer_lines,
-    run_line,
-    share_lines,
-    write_report,
-)
+from benchmarks.common import OUT, ROOT
+from trajopt.bench.answers import answer_lines, beaten_lines, budget_lines, part_lines
+from trajopt.bench.page import run_line, share_lines, write_report
 from trajopt.bench.tables import BenchTables
 from trajopt.sweeps.store import open_store
 
@@ -38,12 +33,17 @@ def main() -> None:
     store = open_store(parser.parse_args().store, create=False)
     report = store.path / "report"
     write_report(store, report)
-    tables = BenchTables(store.frame().to_dict("records"))
+    budgets = BenchTables.by_budget(store.frame().to_dict("records"))
+    tables = list(budgets.values())[-1]
+    statistics = (OUT / "pso_statistics.md").read_text(encoding="utf-8")
     parts = {
-        "run": [run_line(store, tables)],
+        "run": [run_line(store, budgets)],
         "answers": answer_lines(tables),
+        "budgets": budget_lines(budgets),
+        "parts": part_lines(tables),
         "shares": share_lines(tables, report),
-        "peers": peer_lines(tables),
+        "peers": statistics.replace("## ", "### ").split("\n", 2)[2].splitlines(),
+        "best": beaten_lines(tables)[:1],
     }
     text = PAGE.read_text(encoding="utf-8")
     for name, lines in parts.items():
