@@ -253,6 +253,16 @@ def test_several_budgets_and_the_sections_that_tell_of_them(tmp_path: Path) -> N
             load_bench(file)
 
 
+@pytest.mark.parametrize("name", ["auto", "l-bfgs-b", "nelder-mead", "slsqp", "cobyqa", "pso"])
+def test_objectives_with_starts_of_their_own(name: str) -> None:
+    """A path's least time offers its given knots as a start."""
+    problem = bench_problem("powerbot/experiment_1")
+    assert hasattr(problem.objective, "starts")
+    found = minimize(problem.objective, problem.bounds, optimizer=name, budget=Budget(40))
+    assert found.fun < problem.reference
+    assert found.nfev == 40
+
+
 def test_a_known_cost_that_a_search_beats_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     from trajopt.bench import answers, problems
 
