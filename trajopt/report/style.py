@@ -16,9 +16,10 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 from matplotlib.ticker import FuncFormatter, LogFormatter, NullFormatter
 
-from trajopt.arrays import Array
+from trajopt.arrays import AnyArray, Array
 from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
 from trajopt.report.files import FORMATS
@@ -128,6 +129,9 @@ def _power(value: float, _: int | None) -> str:
     return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
+_PAD = 0.1  # inches of white around what is drawn; chosen
+
+
 def save_figure(figure: Figure, file: FilePath) -> FilePath:
     """Write a picture, PNG, PDF or SVG by its suffix, whole or not at all. Returns ``file``.
 
@@ -137,9 +141,33 @@ def save_figure(figure: Figure, file: FilePath) -> FilePath:
     if kind not in FORMATS:
         raise ArgumentError("file", str(file), "a name that ends in .png, .pdf or .svg")
     plain_powers(figure)
+    picture = _drawn(figure) if kind == "png" else None
     with whole_file(file) as part:
-        figure.savefig(part, format=kind, dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
+        if picture is None:
+            figure.savefig(part, format=kind, dpi=RESOLUTION, bbox_inches="tight", pad_inches=_PAD)
+        else:
+            imsave(part, picture, format=kind, dpi=RESOLUTION)
     return file
+
+
+def _drawn(figure: Figure) -> AnyArray | None:
+    """Pixels (H, W, 4) of what a figure shows with ``_PAD`` around it: drawn once, where ``savefig``
+    draws twice and measures in between. None where a title is longer than the figure is wide."""
+    figure.dpi = RESOLUTION
+    figure.set_facecolor("white")
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    titles = [title for axes in figure.axes for title in (axes.title, axes._left_title)]
+    reach = [title.get_window_extent(canvas.get_renderer()) for title in titles]
+    if any(box.x1 > figure.bbox.x1 for box in reach):
+        return None
+    pixels = np.asarray(canvas.buffer_rgba())
+    pad = round(_PAD * RESOLUTION)
+    shown = []
+    for axis in (1, 0):
+        inked = np.flatnonzero((pixels[..., :3] < 255).any(axis=2).any(axis=axis))
+        shown.append(slice(max(inked[0] - pad, 0), inked[-1] + 1 + pad) if len(inked) else slice(1))
+    return np.ascontiguousarray(pixels[shown[0], shown[1]])
 
 
 def telling(values: Array, most: int = MOST_LINES) -> list[int]:
