@@ -70,7 +70,7 @@ def _watched() -> None:
     """Have numba tell when it compiles; what a function calls is compiled inside."""
     from numba.core import event
 
-    class Watch(event.Listener):  # type: ignore[misc]
+    class Watch(event.Listener):
         depth, told = 0, False
         began = 0.0, 0.0
 
@@ -89,7 +89,7 @@ def _watched() -> None:
                 _spent["wall"] += time.perf_counter() - self.began[0]
                 _spent["cpu"] += time.process_time() - self.began[1]
 
-    event.register("numba:compile", Watch())
+    event.register("numba:compile", Watch())  # type: ignore[no-untyped-call]
 
 
 @lru_cache(maxsize=1)

@@ -152,22 +152,29 @@ def save_figure(figure: Figure, file: FilePath) -> FilePath:
 
 def _drawn(figure: Figure) -> AnyArray | None:
     """Pixels (H, W, 4) of what a figure shows with ``_PAD`` around it: drawn once, where ``savefig``
-    draws twice and measures in between. None where a title is longer than the figure is wide."""
+    draws twice and measures in between. None where something reaches beyond the figure."""
     figure.dpi = RESOLUTION
     figure.set_facecolor("white")
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
-    titles = [title for axes in figure.axes for title in (axes.title, axes._left_title)]
+    parts: list[Any] = list(figure.axes)
+    titles = [title for axes in parts for title in (axes.title, axes._left_title)]
     reach = [title.get_window_extent(canvas.get_renderer()) for title in titles]
-    if any(box.x1 > figure.bbox.x1 for box in reach):
-        return None
     pixels = np.asarray(canvas.buffer_rgba())
+    inked = np.asarray(np.min(pixels[..., :3], axis=2) < 255)
+    edges = (inked[:2], inked[-2:], inked[:, :2], inked[:, -2:])
+    if (
+        any(edge.any() for edge in edges)
+        or any(box.x1 > figure.bbox.x1 for box in reach)
+        or not inked.any()
+    ):
+        return None
+    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
     pad = round(_PAD * RESOLUTION)
-    shown = []
-    for axis in (1, 0):
-        inked = np.flatnonzero((pixels[..., :3] < 255).any(axis=2).any(axis=axis))
-        shown.append(slice(max(inked[0] - pad, 0), inked[-1] + 1 + pad) if len(inked) else slice(1))
-    return np.ascontiguousarray(pixels[shown[0], shown[1]])
+    high, wide = (
+        slice(max(int(ink[0]) - pad, 0), int(ink[-1]) + 1 + pad) for ink in (rows, columns)
+    )
+    return np.ascontiguousarray(pixels[high, wide])
 
 
 def telling(values: Array, most: int = MOST_LINES) -> list[int]:
