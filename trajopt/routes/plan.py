@@ -24,12 +24,12 @@ from trajopt.routes.cells import CELLS, kind_of
 from trajopt.routes.cover import Cover, cover
 from trajopt.routes.envelope import Envelope, envelope_of
 from trajopt.routes.field import Field, field_of
-from trajopt.routes.program import Program, Solved, Weights, program_of
+from trajopt.routes.program import Solved, Weights, program_of
 from trajopt.routes.proof import why_none
 from trajopt.routes.ways import Way, ways
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.clearance import Clearance, path_clearance
+from trajopt.world.clearance import Clearance, outline_distances, path_clearance
 from trajopt.world.crossing import outlines_at
 from trajopt.world.scene import Scene
 
@@ -44,8 +44,12 @@ _FEWEST, _MOST, _STEP = 10, 64, 6  # control points, and the step between number
 LONGER = 1.15  # times the shortest way: longer ones are not made smooth
 _LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; added to what lacks
 _TIGHT = 0.5  # of the room beside a disc in the narrowest place: what discs may keep there
+_TRUST = 0.25  # of what discs leave of the outline, kept from the start; chosen: seldom too little
 _ROUNDED = 1.8  # times that room: spacing of a field whose spline does not round a ridge off
-_TRIES = 4  # times that more room is given
+_TRIES = 6  # times that more room is given
+_BESIDE = (
+    3  # nodes on either side that get more room too: a corner slides along the outline; chosen
+)
 _HELD = 0.95  # of the speeds of two stages that a program starts from
 _EXACT = 1e-6  # m of clearance that is rounding
 
@@ -137,7 +141,7 @@ def plan_route(
         aim,
         free,
         discs,
-        envelope_of(robot, limits, free),
+        envelope_of(robot, limits, free, scene.ground),
         dict(timing or {}),
     )
     field = field_of(scene, np.array([ends[0][:2], ends[1][:2]]))
@@ -169,68 +173,67 @@ def _told(near: float) -> str:
 
 def _attempts(job: _Job, field: Field, found: Sequence[Way]) -> Iterator[Attempt]:
     """Two stages for every way; then, for least time, one program from the better ones."""
-    firsts: list[tuple[Attempt, Solved, tuple[Field, float], Program]] = []
+    firsts: list[tuple[Attempt, Solved, Field, Array]] = []
     for way in found:
         if way.length > LONGER * found[0].length and firsts:
             continue
-        near = _near(job, field, way)
-        program = _program(job, way)
-        start = _guess(job, way, program)
-        attempt, solved = _free(job, near, program, way, start, "two stages")
+        near, room = _near(job, field, way)
+        guess = _guess(job, way)
+        rooms = np.full(len(guess.speeds) - 2, job.clearance + room)
+        attempt, solved = _free(job, near, rooms, way, guess, "two stages")
         yield attempt
-        firsts.append((attempt, solved, near, program))
+        firsts.append((attempt, solved, near, rooms))
     if job.aim != "duration":
         return
     least = min((first[0].cost("duration") for first in firsts), default=np.inf)
-    for attempt, solved, near, program in firsts:
+    for attempt, solved, near, rooms in firsts:
         if attempt.trajectory is None or attempt.cost("duration") > CLOSE * least:
             continue
-        start = replace(solved, speeds=_HELD * _speeds(attempt.trajectory, program))
-        yield _free(job, near, program, attempt.way, start, "one program")[0]
+        start = replace(solved, speeds=_HELD * _speeds(attempt.trajectory, len(solved.speeds)))
+        yield _free(job, near, rooms, attempt.way, start, "one program")[0]
 
 
-def _program(job: _Job, way: Way) -> Program:
+def _guess(job: _Job, way: Way) -> Solved:
     side = float(np.ptp(np.array(job.robot.footprint), axis=0).max())
-    count = int(np.ceil((way.length / (_SPACING * side) - _FEWEST + 3) / _STEP))
-    points = int(np.clip(_FEWEST + _STEP * count, _FEWEST, _MOST))
-    return program_of(kind_of(job.envelope), points, len(job.discs.radii))
+    steps = int(np.ceil((way.length / (_SPACING * side) - _FEWEST + 3) / _STEP))
+    count = int(np.clip(_FEWEST + _STEP * steps, _FEWEST, _MOST))
+    points = fitted(way.points, count, job.ends, job.free)
+    return Solved(points, np.zeros(CELLS * (count - 3) + 1))
 
 
-def _guess(job: _Job, way: Way, program: Program) -> Solved:
-    points = fitted(way.points, program.points, job.ends, job.free)
-    return Solved(points, np.zeros(program.cells + 1))
-
-
-def _speeds(trajectory: Trajectory, program: Program) -> Array:
-    """(N+1,): s' at the nodes."""
-    u = np.arange(program.cells + 1) / CELLS
+def _speeds(trajectory: Trajectory, nodes: int) -> Array:
+    """(nodes,): s' at the nodes of a program."""
+    u = np.arange(nodes) / CELLS
     squares = np.interp(trajectory.path.parameter(u), trajectory.s, trajectory.sd**2)
     return np.sqrt(squares)
 
 
 def _free(
-    job: _Job,
-    near: tuple[Field, float],
-    program: Program,
-    way: Way,
-    start: Solved,
-    method: Method,
+    job: _Job, near: Field, rooms: Array, way: Way, start: Solved, method: Method
 ) -> tuple[Attempt, Solved]:
-    """The program's path with as much room as the outline itself needs, and its timing."""
-    weights = Weights(1.0) if method == "one program" else Weights(0.0, 1.0, BEND)
-    field, extra = near
-    room = job.clearance + extra
-    attempt, solved = Attempt(way, method), start
+    """The program's path and its timing. ``rooms`` (N-1,), m, of discs at the inner nodes grow where
+    the outline itself needs more."""
+    from scipy.ndimage import maximum_filter1d
+
+    whole = method == "one program"
+    weights = Weights(1.0) if whole else Weights(0.0, 1.0, BEND)
+    envelope = job.envelope if whole else job.envelope.bare
+    program = program_of(kind_of(envelope), len(start.points), len(job.discs.radii))
+    attempt, solved, goal = Attempt(way, method), start, job.clearance - _EXACT
+    footprint, keep_out = job.robot.footprint, job.scene.keep_out
+    u = np.arange(1, len(rooms) + 1) / CELLS
     for _ in range(_TRIES):
-        solved = program.solve(solved, job.ends, job.envelope, job.discs, field, weights, room)
+        solved = program.solve(solved, job.ends, envelope, job.discs, near, weights, rooms)
         path = as_path(solved.points, job.robot.turning_length)
-        found = path_clearance(
-            path, job.robot.footprint, job.scene.keep_out, enough=job.clearance - _EXACT
-        )
-        if found.bound >= job.clearance - _EXACT:
+        found = path_clearance(path, footprint, keep_out, enough=goal)
+        if found.bound >= goal:
             return _timed(job, replace(attempt, path=path, clearance=found)), solved
         attempt = replace(attempt, why=f"{found}; IPOPT: {solved.status}")
-        room += job.clearance - found.distance + _MORE
+        lacks = job.clearance - outline_distances(path, u, footprint, keep_out)[0]
+        worst = np.argmin(np.abs(path.parameter(u) - found.s))
+        lacks[worst] = max(lacks[worst], job.clearance - found.distance)
+        lacks = maximum_filter1d(lacks, 2 * _BESIDE + 1)
+        rooms += np.where(lacks > 0, lacks + _MORE, 0.0)
     return attempt, solved
 
 
@@ -245,7 +248,7 @@ def _near(job: _Job, field: Field, way: Way) -> tuple[Field, float]:
         tight = way.points[_ROUNDED * slack < near.spacing]
         reach = 1.5 * float(np.hypot(*np.transpose(job.robot.footprint)).max())
         near = near.finer(job.scene, _ROUNDED * least, tight, reach)
-    return near, float(np.clip(_TIGHT * least, _LEAST, job.discs.gap))
+    return near, float(np.clip(_TIGHT * least, _LEAST, _TRUST * job.discs.gap))
 
 
 def _timed(job: _Job, attempt: Attempt) -> Attempt:
