@@ -181,14 +181,15 @@ def _along(robot: Robot, limits: Sequence[Acceleration]) -> tuple[float, float]:
 
 
 def _probe(robot: Robot, curvature: float) -> PathSamples:
-    """Four samples with wheels as on a circle; a unit acceleration along, across and in yaw, and
-    none, under gravity straight down."""
+    """Four samples with steered wheels as on a circle; a unit acceleration along, across and in yaw,
+    and none, under gravity straight down."""
     radius = 1 / max(abs(curvature), _FLATTEST)
     angle = np.linspace(0.0, min(1.0, 1.0 / radius), 9)
     bent = np.column_stack([np.sin(angle), np.sign(curvature) * (1 - np.cos(angle))])
     path = Path.through(radius * bent)
     s = np.full(4, path.length / 2)
-    found = track(path, robot).samples(s, path.locate(s))
+    steers = len(steering_of(robot).steered) > 0  # else wheels, castors too, as they are drawn
+    found = track(path, robot if steers else None).samples(s, path.locate(s))
     ahead, yaw = np.eye(4, 3) * [1.0, 1.0, 0.0], np.eye(4, 3) * [0.0, 0.0, 1.0]
     return replace(
         found, velocity=ahead, turning=yaw, twist=ahead + yaw, gravity=np.tile([0.0, 0.0, -1.0], (4, 1))

@@ -8,6 +8,7 @@ said of a route is recomputed, and the better of both stages' and the program's 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -57,7 +58,7 @@ _EXACT = 1e-6  # m of clearance that is rounding
 @dataclass(frozen=True, eq=False)
 class Attempt:
     """One way, as far as it got: the ``path``, its ``trajectory`` and ``clearance``; why it ended
-    where there is none."""
+    where there is none. ``seconds`` of processor time after the search began it was there."""
 
     way: Way
     method: Method
@@ -65,6 +66,7 @@ class Attempt:
     clearance: Clearance | None = None
     trajectory: Trajectory | None = None
     why: str = ""
+    seconds: float = 0.0
 
     def cost(self, aim: Aim) -> float:
         """Duration (s) or length (m); inf where it did not get there."""
@@ -124,6 +126,7 @@ def plan_route(
     Finding none is an answer, not an error. Raises InfeasibleError where the limits allow no motion
     at all.
     """
+    started = time.process_time()
     free = robot.holonomic if free is None else free
     ends = (np.array(start, dtype=np.float64), np.array(goal, dtype=np.float64))
     discs = cover(tuple(robot.footprint))
@@ -147,7 +150,10 @@ def plan_route(
     field = field_of(scene, np.array([ends[0][:2], ends[1][:2]]))
     inner = discs.inner[2] + clearance
     found = ways(field, ends[0][:2], ends[1][:2], inner, 2 * inner, MOST_WAYS)
-    attempts = list(_attempts(job, field, found))
+    attempts = [
+        replace(attempt, seconds=time.process_time() - started)
+        for attempt in _attempts(job, field, found)
+    ]
     best = min(attempts, key=lambda a: a.cost(aim), default=None)
     if best is not None and best.trajectory is not None:
         return Route(tuple(attempts), best)
