@@ -3,7 +3,9 @@ one line that names the argument; texts and masks are never numbers."""
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,9 @@ from trajopt.limits.friction import FrictionAlong, FrictionMap
 from trajopt.limits.limit import Limit
 from trajopt.limits.registry import LIMITS
 from trajopt.limits.speed import Speed
+from trajopt.timing.many import time_scale_many
+from trajopt.timing.nominal import nominal_timing
+from trajopt.timing.sensitivity import sensitivities
 from trajopt.world.height_map import HeightMap
 from trajopt.world.mesh import Mesh
 from trajopt.world.obstacles import OBSTACLES
@@ -63,6 +68,9 @@ CALLS: Mapping[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         },
     ),
     "acceleration": (LIMITS["acceleration"], {"forward": 1.0, "braking": 1.0}),
+    "contact": (LIMITS["contact"], {"share": 0.1}),
+    "power": (LIMITS["power"], {"largest": 50.0}),
+    "wheel_torque": (LIMITS["wheel_torque"], {"largest": 3.0}),
     "slip": (LIMITS["slip"], {"friction": 0.5, "sides": 8}),
     "speed": (LIMITS["speed"], {"largest": 1.0}),
     "speed_profile": (LIMITS["speed_profile"], {"places": (0.0, 1.0), "speeds": (1.0, 1.0)}),
@@ -116,8 +124,14 @@ CALLS: Mapping[str, tuple[Callable[..., Any], dict[str, Any]]] = {
             "stops": [1.0],
             "gridpoints": 20,
             "start_wheels": [0.0] * 4,
+            "gap": 0.01,
         },
     ),
+    "nominal_timing": (
+        lambda **k: nominal_timing(PATH, limits=SPEED, **k),
+        {"duration": 3.0, "start_wheels": []},
+    ),
+    "sensitivities": (lambda **k: sensitivities(TIMED, **k), {"change": 0.01}),
     "trajectory.at": (TIMED.at, {"t": [0.0, 0.5]}),
     "path.position": (PATH.position, {"u": [0.0, 0.5], "derivative": 0}),
     "path.locate": (PATH.locate, {"s": [0.0, 0.5]}),
@@ -149,6 +163,10 @@ WRONG: Mapping[str, Any] = {
     "complex": 1j,
     "nan": float("nan"),
     "object": object(),
+    "date": datetime.datetime(2026, 1, 1),
+    "dates": np.array(["2026-01-01"], dtype="datetime64[D]"),
+    "hidden": np.ma.array([1.0], mask=[True]),
+    "fraction": Fraction(1, 2),
     "nothing": [None],
     "mapping": {"a": 1},
     "huge": 10**400,
@@ -194,6 +212,9 @@ def test_arguments_that_are_no_objects_of_ours_are_refused() -> None:
             lambda w=wrong: time_scale(w, SPEED),
             lambda w=wrong: time_scale(PATH, w),
             lambda w=wrong: time_scale(PATH, [w]),
+            lambda w=wrong: nominal_timing(w, 1.0, SPEED),
+            lambda w=wrong: nominal_timing(PATH, 1.0, [w]),
+            lambda w=wrong: sensitivities(w),
             lambda w=wrong: Robot.load(w),
             lambda w=wrong: robot(w),
         ):
@@ -201,3 +222,17 @@ def test_arguments_that_are_no_objects_of_ours_are_refused() -> None:
                 refused()
     with pytest.raises(ArgumentError, match="robot"):
         time_scale(PATH, SPEED, robot=3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("wrong", [None, 3, "none", ["auto"], np.array(["auto", "auto"])])
+def test_choices_are_texts_of_a_list(wrong: Any) -> None:
+    for refused in (
+        lambda: time_scale(PATH, SPEED, engine=wrong),
+        lambda: time_scale(PATH, SPEED, too_fast=wrong),
+        lambda: LIMITS["slip"](0.5, rule=0 if wrong is None else wrong),
+        lambda: Path.through([[0, 0], [1, 0], [1, 1]], closed=wrong),
+        lambda: time_scale(PATH, [Speed(1.0, name=[wrong])]),  # type: ignore[arg-type]
+        lambda: time_scale_many(PATH, SPEED, executor=[wrong]),
+    ):
+        with pytest.raises(ArgumentError):
+            refused()

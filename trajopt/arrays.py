@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from numbers import Real
+from collections.abc import Callable, Iterable
 from typing import Any, overload
 
 import numpy as np
@@ -44,13 +43,17 @@ Shape = tuple[int | None, ...]  # of an array; None: any length
 
 def as_numbers(argument: str, value: Any, expected: str, shape: Shape | None = None) -> Array:
     """``value`` as an array of real numbers, of ``shape`` where one is given: no texts, no masks, no
-    complex numbers, nothing ragged. Raises ArgumentError, saying what was ``expected``."""
+    complex numbers, nothing ragged; what a masked array hides is not a number. Raises ArgumentError,
+    saying what was ``expected``."""
     try:
+        if isinstance(value, np.ma.MaskedArray):
+            value = np.ma.filled(value.astype(np.float64), np.nan)
         array = np.asarray(value)
         if array.dtype == object and all(_is_real(v) for v in array.flat):  # whole ones of any size
             array = array.astype(np.float64)
         if array.dtype.kind in "iuf" or array.size == 0:
-            array = np.asarray(value, dtype=np.float64)
+            with np.errstate(over="ignore"):  # long doubles
+                array = np.asarray(value, dtype=np.float64)
             if shape is None or (
                 len(shape) == array.ndim
                 and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
@@ -62,7 +65,7 @@ def as_numbers(argument: str, value: Any, expected: str, shape: Shape | None = N
 
 
 def _is_real(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, (bool, np.bool_))
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
 def require_finite(
@@ -118,3 +121,16 @@ def require_whole(argument: str, value: Any, least: int, expected: str, most: in
     """Raises ArgumentError unless ``value`` is a whole number in ``least`` .. ``most``."""
     if not (isinstance(value, (int, np.integer)) and _is_real(value) and least <= value <= most):
         raise ArgumentError(argument, value, expected)
+
+
+def require_choice(argument: str, value: Any, choices: Iterable[str]) -> None:
+    """Raises ArgumentError unless ``value`` is one of the texts ``choices``."""
+    known = tuple(choices)
+    if not (isinstance(value, str) and value in known):
+        raise ArgumentError(argument, value, "one of " + ", ".join(known))
+
+
+def require_flag(argument: str, value: Any) -> None:
+    """Raises ArgumentError unless ``value`` is true or false."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise ArgumentError(argument, value, "true or false")

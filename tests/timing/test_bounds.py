@@ -9,11 +9,17 @@ from wild import wild
 from trajopt.arrays import Array
 from trajopt.errors import TrajoptError
 from trajopt.limits.limit import is_linear
+from trajopt.limits.power import Power
+from trajopt.limits.wheel_acceleration import WheelAcceleration
+from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.paths.path import Path
+from trajopt.robots.robot import robot
 from trajopt.timing.cells import Cells, Measure, cells_of
 from trajopt.timing.curved import source_of
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
 
+LINE = Path.through([[0, 0], [2, 0]])
 NEAR = 5e-5
 MOST = 2500  # cells of a convex program
 
@@ -163,6 +169,28 @@ def test_the_bound_is_below_many_points_and_a_convex_program():
     by_points, by_program = compare(range(20_000, 21_000), 8, 8_000)
     assert by_points == 8
     assert by_program >= 4
+
+
+@pytest.mark.parametrize("power", [1e-9, 1.0, 1e3])
+def test_power_alone_from_rest_takes_its_closed_form(power):
+    """v^3 = 3 P s / m, and nothing bounds braking: 3/2 s^(2/3) (m / 3 P)^(1/3)."""
+    one = robot("powerbot")
+    found = time_scale(LINE, [Power(power)], robot=one)
+    mass = one.body.mass + sum(w.mass / 2 for w in one.rolling if w.name in one.driven)
+    expected = 1.5 * 2.0 ** (2 / 3) * (mass / 3 / power) ** (1 / 3)
+    assert found.bound == pytest.approx(expected, rel=5e-4)
+    assert found.bound <= expected * (1 + 5e-5)
+    assert expected <= found.duration <= expected * (1 + 1e-3)
+    assert found.gap <= 1e-3
+
+
+def test_power_where_a_needle_turns_in_no_length():
+    """Wheels turn fast at path speeds of 1e-9 m/s."""
+    limits = [Power(20.0), WheelSpeed(19.0), WheelAcceleration(48.0)]
+    path = Path.through([[0, 0], [1, 0], [0.03, 1e-4]])
+    found = time_scale(path, limits, robot=robot("powerbot"))
+    assert found.gap <= 1e-3
+    assert min(found.margins().values()) > -1e-9
 
 
 @pytest.mark.slow

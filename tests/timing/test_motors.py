@@ -173,7 +173,11 @@ def test_hills_and_bends_against_scalars(curve):
     times = [by_scalars(HILLS, one, 150.0, cells) for cells in (1500, 3000)]
     expected = 2 * times[1] - times[0]
     assert found.duration == pytest.approx(expected, rel=1e-4)
-    assert found.bound < expected < found.duration
+    # Bound and motion are nearer to each other than to these scalars, which with 12,000 cells and
+    # extrapolated come to 7.37964 s and 9.53257 s: bounds and motions to 7.37965 and 7.37966 s, 9.53243
+    # and 9.53244 s.
+    assert found.bound * (1 - 5e-5) < expected < found.duration * (1 + 5e-5)
+    assert found.gap < 2e-5
     assert min(found.margins().values()) > -1e-9
     assert {"motor_curve", "wheel_torque", "power"} >= set(found.binding) - {""} >= {"motor_curve"}
 

@@ -4,14 +4,16 @@ input, 130 where Ctrl-C or SIGTERM ended it."""
 from __future__ import annotations
 
 import importlib
+import logging
 import sys
+import traceback
 from typing import Annotated
 
 import typer
 
 import trajopt
-from trajopt.cli import bench, paths, robot, search, sweep, view
-from trajopt.cli.shared import INTERRUPTED, leaving
+from trajopt.cli import bench, examples, paths, robot, search, sweep, view
+from trajopt.cli.shared import INTERRUPTED, leaving, switched
 from trajopt.errors import TrajoptError
 
 app = typer.Typer(
@@ -22,6 +24,7 @@ app = typer.Typer(
 )
 # modules of systems that bring commands of their own (``COMMANDS``): one line a system
 SYSTEMS = ("trajopt.systems.smdw.commands",)
+TELLING = {search.solve, search.validate, paths.explain}  # with --json
 for command in (
     search.solve,
     search.validate,
@@ -31,10 +34,11 @@ for command in (
     paths.compare,
     search.schema,
     robot.robot,
+    examples.examples,
     sweep.report,
     view.view,
 ):
-    app.command()(command)
+    app.command()(switched(command, tells=command in TELLING))
 app.add_typer(bench.app, name="bench")
 app.add_typer(sweep.app, name="sweep")
 
@@ -65,6 +69,8 @@ def main() -> None:
     except (TrajoptError, OSError) as error:
         from trajopt.report.console import PlainConsole
 
+        if logging.getLogger().isEnabledFor(logging.INFO):  # --verbose
+            traceback.print_exc()
         PlainConsole(stderr=True, soft_wrap=True).print(f"error: {error}")
         sys.exit(UNUSABLE)
     except KeyboardInterrupt:

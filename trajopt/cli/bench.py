@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
-from trajopt.cli.shared import console
+from trajopt.cli.shared import Bar, console, switched
 from trajopt.cli.sweep import KeepOld, Rerun, old_rows
-
-if TYPE_CHECKING:
-    from trajopt.sweeps.drive import Progress as SweepProgress
 
 RUN = "run"
 BEST_KNOWN = Path("trajopt") / "bench" / "best_known.json"  # in a checkout
@@ -46,6 +43,7 @@ Plugins = Annotated[
 
 
 @app.command(RUN)
+@switched
 def run(
     bench_file: BenchFile,
     store: StoreOption = None,
@@ -76,34 +74,20 @@ def run(
         f"{plan.title}: {len(plan.problems)} problems, {len(plan.optimizers)} optimizers, {total} searches; "
         f"rows in {place}"
     )
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
-
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console.made) as bar:
-        task = bar.add_task("searches", total=None)
-
-        def report(now: SweepProgress) -> None:
-            bar.update(task, completed=now.finished, total=now.total)
-
-        options: dict[str, Any] = {"jobs": jobs, "retry_failed": retry_failed, "progress": report}
-        found = run_bench(plan, place, old=old_rows(rerun, keep_old), **options)
+    with Bar("searches", total) as bar:
+        found = run_bench(
+            plan,
+            place,
+            old=old_rows(rerun, keep_old),
+            jobs=jobs,
+            retry_failed=retry_failed,
+            progress=lambda now: bar.count(now.finished, now.total),
+        )
     console.print(", ".join(f"{count} {name}" for name, count in found.counts().items()))
 
 
 @app.command("report")
+@switched
 def report(
     store: Annotated[
         Path, typer.Argument(help="rows of a benchmark (its directory)", show_default=False)
@@ -121,6 +105,7 @@ def report(
 
 
 @app.command("best")
+@switched
 def best(
     store: Annotated[
         Path, typer.Argument(help="rows of a benchmark (its directory)", show_default=False)

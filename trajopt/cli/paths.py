@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trajopt.cli.shared import Overrides, console, overrides, simple_table
+from trajopt.cli.shared import Force, Overrides, console, overrides, require_free, simple_table
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from trajopt.timing.trajectory import Trajectory
 
 Plan = Annotated[
@@ -26,47 +28,39 @@ def explain(
     engine: Annotated[str, typer.Option(help="auto, toppra or compiled")] = "auto",
 ) -> None:
     """Show which limit binds on which stretch, and what a 1 % change of each limit would save."""
-    from trajopt.report.motion import limit_use, most
-    from trajopt.timing.engines import ENGINES
-    from trajopt.timing.sensitivity import sensitivities
+    from trajopt.report.explained import explained
 
-    trajectory = _timed(plan, set_, engine)
+    facts = explained(_timed(plan, set_, engine))
+    gap = facts["gap"]
+    near = "" if gap is None else f", at most {100 * gap:.2g} % above the least time"
     console.print(
         words(
             (str(plan), "bold"),
-            f": {trajectory.duration:.4f} s over {trajectory.path.length:.3f} m "
-            f"({trajectory.engine}, slowed by {trajectory.slowdown - 1:.1e}{_near(trajectory)})",
+            f": {facts['duration_s']:.4f} s over {facts['length_m']:.3f} m "
+            f"({facts['engine']}, slowed by {facts['slowdown'] - 1:.1e}{near})",
         )
     )
-    stretches = simple_table()
-    for column in ("from s (m)", "to s (m)", "limit that binds"):
-        stretches.add_column(column, justify="left" if "limit" in column else "right")
-    for stretch in trajectory.active:
-        stretches.add_row(f"{stretch.start:.3f}", f"{stretch.end:.3f}", stretch.limit)
-    console.print(stretches)
-    limits = simple_table()
-    for column in ("limit", "least margin", "at s (m)", "1 % more saves (s)"):
-        limits.add_column(column, justify="left" if column == "limit" else "right")
-    optimal = trajectory.engine in ENGINES  # only of those one can say what a limit costs
-    savings = sensitivities(trajectory) if optimal else {}
-    times, used = limit_use(trajectory)
-    tightest = times[used.argmax(axis=0), range(used.shape[1])]
-    names = [limit.name for limit in trajectory.limits]
-    places = dict(zip(names, trajectory.along(tightest)[0], strict=True))
-    for name, margin in sorted(
-        trajectory.margins().items(), key=lambda item: (-savings.get(item[0], 0.0), item[1])
-    ):
-        saved = f"{savings[name]:.4f}" if optimal else "not time-optimal"
-        shown = f"{margin if margin < -1e-9 else max(margin, 0.0):.2%}"
-        limits.add_row(name, shown, f"{places[name]:.3f}", saved)
-    console.print(limits)
-    extremes = simple_table()
-    for column in ("on the way", "up to", "at s (m)"):
-        extremes.add_column(column, justify="left" if column == "on the way" else "right")
-    for name, value, place in most(trajectory):
-        extremes.add_row(name, value, f"{place:.3f}")
-    if extremes.rows:
-        console.print(extremes)
+    if facts["why_gap"]:
+        console.print(f"above the least time: {facts['why_gap']}")
+    stretches = _table("from s (m)", "to s (m)", "limit that binds")
+    for part in facts["stretches"]:
+        stretches.add_row(f"{part['from_m']:.3f}", f"{part['to_m']:.3f}", part["limit"])
+    limits = _table("limit", "least margin", "at s (m)", "1 % more saves (s)")
+    for limit in facts["limits"]:
+        saved = limit["one_percent_saves_s"]
+        limits.add_row(
+            limit["limit"],
+            f"{limit['margin']:.2%}",
+            f"{limit['at_m']:.3f}",
+            "not time-optimal" if saved is None else f"{saved:.4f}",
+        )
+    extremes = _table("on the way", "up to", "at s (m)")
+    for extreme in facts["on_the_way"]:
+        extremes.add_row(extreme["what"], extreme["up_to"], f"{extreme['at_m']:.3f}")
+    for table in (stretches, limits, extremes):
+        if table.rows:
+            console.print(table)
+    console.facts(facts)
 
 
 def export(
@@ -89,11 +83,13 @@ def export(
         typer.Option(help="of commands: mean (exact wheel angles) or held (as Waheed 2006)"),
     ] = None,
     set_: Overrides = None,
+    force: Force = False,
 ) -> None:
     """Write a motion for other programs; as CSV: t (s), v_<wheel> (m/s at the rim),
     steering_<wheel> (rad) where it steers, vx, vy, wz of the body."""
     from trajopt.formats import export as write
 
+    require_free("--out", out, force)
     told = write(_timed(plan, set_, "auto"), out, format_, sample_time=sample_time, rule=rule)
     console.print(f"wrote {told} to {out}", soft_wrap=True)
 
@@ -140,7 +136,10 @@ def _timed(plan: Path, set_: list[str] | None, engine: str) -> Trajectory:
     return solution.trajectory
 
 
-def _near(trajectory: Trajectory) -> str:
-    """How far above the least time the duration can be."""
-    gap = trajectory.gap
-    return "" if gap is None else f", at most {100 * gap:.2g} % above the least time"
+def _table(*columns: str) -> Table:
+    """With words to the left and numbers to the right."""
+    table = simple_table()
+    for column in columns:
+        left = column.startswith(("limit", "on the way"))
+        table.add_column(column, justify="left" if left else "right")
+    return table

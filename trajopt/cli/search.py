@@ -13,6 +13,7 @@ from trajopt.cli.shared import (
     INTERRUPTED,
     Bar,
     ControlOption,
+    Force,
     FormatOption,
     Overrides,
     ProblemFile,
@@ -20,6 +21,7 @@ from trajopt.cli.shared import (
     control_mode,
     overrides,
     picture_kind,
+    require_free,
 )
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
@@ -57,11 +59,13 @@ def solve(
     ] = False,
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
     format_: FormatOption = None,
+    force: Force = False,
 ) -> None:
     """Do the job of a problem (search, time a path, plan a climb), and write what was found."""
     from trajopt.optimize.base import Status
     from trajopt.pipeline import solve as solve_problem
     from trajopt.problem import load_problem
+    from trajopt.report.run_folder import solution_summary
     from trajopt.report.tables import solution_table
 
     kind = picture_kind(pictures, format_)
@@ -83,8 +87,9 @@ def solve(
             progress=bar.update,
         )
     console.print(solution_table(solution))
+    console.facts(solution_summary(solution, seed=seed))
     if out is not None:
-        _write(solution, out, seed, kind)
+        _write(solution, out, seed, kind, force)
     if not solution.holds:
         for fault in solution.faults:
             console.print(words(("does not hold:", "red"), f" {fault}"))
@@ -108,7 +113,7 @@ def validate(
 ) -> None:
     """Drive a saved solution in a physics engine with real rollers and measure the deviation."""
     from trajopt.pipeline import validate as validate_trajectory
-    from trajopt.report.run_folder import read_solution, write_validation
+    from trajopt.report.run_folder import read_solution, validation_summary, write_validation
     from trajopt.report.tables import validation_table
 
     kind = picture_kind(pictures, format_)
@@ -129,6 +134,7 @@ def validate(
             seed=seed,
         )
     console.print(validation_table(report, solution.problem.robot))
+    console.facts(validation_summary(report, solution.problem.robot))
     write_validation(report, folder, solution.problem.robot)
     if kind:
         from trajopt.report.pictures import save_physics_picture
@@ -144,6 +150,7 @@ def schema(
     out: Annotated[
         Path | None, typer.Option(help="file to write; standard output without it")
     ] = None,
+    force: Force = False,
 ) -> None:
     """Print the JSON schema of problem, robot or sweep files, for editors."""
     from trajopt.problem import problem_schema
@@ -151,6 +158,7 @@ def schema(
     from trajopt.schema import json_schema
     from trajopt.sweeps.sweepfile import sweep_schema
 
+    require_free("--out", out, force)
     kinds = {
         "problem": problem_schema,
         "robot": lambda: json_schema(RobotDescription),
@@ -168,10 +176,11 @@ def schema(
             part.write_text(text, encoding="utf-8")
 
 
-def _write(solution: Solution, out: Path, seed: int, pictures: str | None) -> None:
+def _write(solution: Solution, out: Path, seed: int, pictures: str | None, force: bool) -> None:
     from trajopt.report.run_folder import write_solution
 
-    write_solution(solution, out, seed=seed, command=" ".join(sys.argv), pictures=pictures)
+    command = " ".join(sys.argv)
+    write_solution(solution, out, seed=seed, command=command, pictures=pictures, force=force)
     console.print(f"written to {out}", soft_wrap=True)
 
 

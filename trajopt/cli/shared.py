@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+import logging
 import os
 import signal
 import sys
 import threading
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -23,18 +26,68 @@ if TYPE_CHECKING:
 
 
 class _Output:
-    """The console, made when something is printed: rich takes as long to load as a short command."""
+    """Standard output: tables and lines, or with ``--json`` facts alone, or with ``--quiet``
+    nothing. rich is loaded when something is printed: it takes as long as a short command."""
 
-    def __getattr__(self, name: str) -> Any:
-        from trajopt.report.console import PlainConsole
+    lines, as_json = True, False
 
-        # tables keep their shape when piped
-        made = PlainConsole(width=None if sys.stdout.isatty() else 120)
-        self.__dict__.update({"print": made.print, "made": made})
-        return getattr(made, name)
+    def print(self, *parts: Any, **options: Any) -> None:
+        if not self.lines:
+            return
+        if self._made is None:
+            from trajopt.report.console import PlainConsole
+
+            # tables keep their shape when piped
+            self._made = PlainConsole(width=None if sys.stdout.isatty() else 120)
+        self._made.print(*parts, **options)
+
+    def facts(self, found: Mapping[str, Any]) -> None:
+        """One object of JSON, where that is asked for; numbers that are not finite are null."""
+        if self.as_json:
+            from trajopt.report.files import json_text
+
+            sys.stdout.write(json_text(found))
+
+    _made: Any = None
 
 
-console: Any = _Output()
+console = _Output()
+
+
+_SWITCHES = {
+    "quiet": typer.Option("--quiet", "-q", help="print errors only"),
+    "verbose": typer.Option("--verbose", "-v", help="tell more, and where errors come from"),
+    "as_json": typer.Option("--json", help="print the result as JSON, and nothing else"),
+}
+
+
+def switched(command: Callable[..., None], *, tells: bool = False) -> Callable[..., None]:
+    """The command with --quiet and --verbose, and with --json where it tells facts."""
+    names = ["quiet", "verbose", *(["as_json"] if tells else [])]
+
+    @functools.wraps(command)
+    def run(**given: Any) -> None:
+        asked = {name: given.pop(name) for name in names}
+        console.as_json = bool(asked.get("as_json"))
+        console.lines = not (asked["quiet"] or console.as_json)
+        if asked["verbose"]:
+            logging.basicConfig(level=logging.INFO, format="%(message)s")
+        command(**given)
+
+    hints = get_type_hints(command, include_extras=True)
+    own = [
+        parameter.replace(annotation=hints[name])
+        for name, parameter in inspect.signature(command).parameters.items()
+    ]
+    kind = inspect.Parameter.KEYWORD_ONLY
+    more = [
+        inspect.Parameter(name, kind, default=False, annotation=Annotated[bool, _SWITCHES[name]])
+        for name in names
+    ]
+    run.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
+    run.__annotations__ = {one.name: one.annotation for one in [*own, *more]}
+    return run
+
 
 FAULTY = 1
 INTERRUPTED = 130  # as shells say it of Ctrl-C
@@ -57,6 +110,7 @@ ControlOption = Annotated[
 FormatOption = Annotated[
     str | None, typer.Option("--format", help="of pictures: png (default), pdf or svg")
 ]
+Force = Annotated[bool, typer.Option("--force", help="write over a file that is there")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
@@ -65,6 +119,12 @@ Overrides = Annotated[
         show_default=False,
     ),
 ]
+
+
+def require_free(name: str, file: Path | None, force: bool) -> None:
+    """Raises ArgumentError where ``file`` is there and shall not be written over."""
+    if file is not None and file.exists() and not force:
+        raise ArgumentError(name, str(file), "a file that is not there yet, or --force")
 
 
 def picture_kind(pictures: bool, kind: str | None) -> str | None:
@@ -154,6 +214,7 @@ class Bar:
             bars.BarColumn(),
             bars.TextColumn("{task.fields[best]}"),
             bars.TimeElapsedColumn(),
+            bars.TimeRemainingColumn(),
             console=PlainConsole(stderr=True),
             transient=True,
         )
@@ -168,10 +229,10 @@ class Bar:
         if self._progress is not None:
             self._progress.stop()
 
-    def count(self, done: int) -> None:
-        """Show how much is done."""
+    def count(self, done: int, total: int | None = None) -> None:
+        """Show how much is done, of what (None: as before)."""
         if self._progress is not None:
-            self._progress.update(self._task, completed=done)
+            self._progress.update(self._task, completed=done, total=total)
 
     def update(self, evaluations: int, best: float) -> None:
         """Show how many evaluations are used and the best cost so far."""

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from trajopt.cli.shared import FormatOption, console, leaving, picture_kind
+from trajopt.cli.shared import (
+    Force,
+    FormatOption,
+    console,
+    leaving,
+    picture_kind,
+    require_free,
+    switched,
+)
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -57,6 +65,7 @@ Tls = Annotated[
 
 
 @app.command()
+@switched
 def run(
     sweep_file: SweepFile,
     store: StoreOption = None,
@@ -87,6 +96,7 @@ def run(
 
 
 @app.command("retry-failed")
+@switched
 def retry_failed(
     sweep_file: SweepFile,
     store: StoreOption = None,
@@ -110,6 +120,7 @@ def retry_failed(
 
 
 @app.command()
+@switched
 def submit(
     sweep_file: SweepFile,
     store: StoreOption = None,
@@ -157,6 +168,7 @@ def submit(
 
 
 @app.command()
+@switched
 def status(store: StorePath) -> None:
     """Cases by status, the last runs, and the commonest errors."""
     from trajopt.sweeps.store import open_store
@@ -190,6 +202,7 @@ def status(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def show(
     store: StorePath, case: Annotated[str, typer.Argument(help="first digits of a case")]
 ) -> None:
@@ -244,6 +257,7 @@ def report(
 
 
 @app.command()
+@switched
 def compact(store: StorePath) -> None:
     """Merge the parts of a store into large ones."""
     from trajopt.sweeps.store import open_store
@@ -253,6 +267,7 @@ def compact(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def verify(store: StorePath) -> None:
     """Read everything in a store and compare it with its checksums; exit code 1 for damage."""
     from trajopt.sweeps.store import open_store
@@ -267,6 +282,7 @@ def verify(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def repair(store: StorePath) -> None:
     """Take out what is damaged, with lists of the cases to run again, into <store>/damaged."""
     from trajopt.sweeps.upkeep import repair as repair_store
@@ -278,12 +294,16 @@ def repair(store: StorePath) -> None:
 
 
 @app.command()
+@switched
 def export(
-    store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]
+    store: StorePath,
+    out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")],
+    force: Force = False,
 ) -> None:
     """Write all rows, one a case, to one file."""
     from trajopt.sweeps.store import open_store
 
+    require_free("out", out, force)
     place = open_store(store, create=False)
     if out.suffix not in (".csv", ".parquet", ".jsonl"):
         raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
@@ -303,6 +323,7 @@ def export(
 
 
 @app.command()
+@switched
 def plot(
     store: StorePath,
     out: Annotated[Path, typer.Argument(help="picture to write (*.png, *.pdf, *.svg)")],
@@ -313,10 +334,13 @@ def plot(
     pair: Annotated[
         list[str] | None, typer.Option("--pair", help="column of a picture of pairs; repeat")
     ] = None,
+    force: Force = False,
 ) -> None:
     """Draw a sweep: --x --y --value (heat map), --x --value [--by] (lines), or --pair twice or
     more."""
     from trajopt.report.sweeps import draw
+
+    require_free("out", out, force)
 
     draw(store, out, value=value, x=x, y=y, by=by, pair=pair)
     console.print(f"written to {out}", soft_wrap=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from trajopt.arrays import as_numbers
 from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Rows, linear_rows, require_robot
 from trajopt.limits.loads import contact_loads
@@ -24,8 +25,9 @@ class Contact:
     name: str = "contact"
 
     def __post_init__(self) -> None:
-        if not 0 <= self.share < 1:
-            raise ArgumentError(f"{self.name}.share", self.share, "a share from 0 to below 1")
+        name, expected = f"{self.name}.share", "a share from 0 to below 1"
+        if not 0 <= as_numbers(name, self.share, expected, ()) < 1:
+            raise ArgumentError(name, self.share, expected)
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         loads = contact_loads(path, require_robot(self.name, robot))

@@ -38,7 +38,8 @@ class Limit(Protocol):
 
     One that is not linear in (s'', s'^2) has an attribute ``linear`` = False, and rows that are
     exact at s'^2 = ``path.sd2`` and nowhere looser than the limit; ``a`` does not depend on ``sd2``:
-    see ``MotorCurve``. ``free_at_rest`` = True says that it leaves any force at rest, as ``Power``.
+    see ``MotorCurve``. ``free_at_rest`` = True says that it leaves any force at rest, as ``Power``,
+    whose ``work`` the lower bound on time integrates.
     """
 
     @property

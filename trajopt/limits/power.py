@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from trajopt.arrays import require_positive
+from trajopt.limits.forces import Affine
 from trajopt.limits.limit import Rows, linear_rows, require_robot
 from trajopt.limits.torques import motor_power, tangent_speed
 from trajopt.paths.samples import PathSamples
@@ -33,9 +34,13 @@ class Power:
     def __post_init__(self) -> None:
         require_positive(f"{self.name}.largest", self.largest, "W")
 
-    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
+    def work(self, path: PathSamples, robot: Robot | None) -> Affine:
+        """(N, 1): G, work of all motors per unit of path, N."""
         robot = require_robot(self.name, robot)
-        work = motor_power(path, robot).through(np.ones((1, len(robot.wheels))))
+        return motor_power(path, robot).through(np.ones((1, len(robot.wheels))))
+
+    def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
+        work = self.work(path, robot)
         speed = tangent_speed(path.sd2)
         if speed is None:
             nothing = np.zeros_like(work.a)

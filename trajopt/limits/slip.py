@@ -7,7 +7,7 @@ from typing import get_args
 
 import numpy as np
 
-from trajopt.arrays import Array, require_whole
+from trajopt.arrays import Array, require_choice, require_whole
 from trajopt.errors import ArgumentError
 from trajopt.limits.capacity import capacity_rows, friction_used
 from trajopt.limits.forces import Affine, specific_force
@@ -57,8 +57,8 @@ class Slip:
         require_whole(
             f"{self.name}.sides", self.sides, 4, "4 or more sides of the friction polygon"
         )
-        if self.rule is not None and self.rule not in get_args(Sharing):
-            raise ArgumentError(f"{self.name}.rule", self.rule, " or ".join(get_args(Sharing)))
+        if self.rule is not None:
+            require_choice(f"{self.name}.rule", self.rule, get_args(Sharing))
 
     def rows(self, path: PathSamples, robot: Robot | None) -> Rows:
         robot = require_robot(self.name, robot)

@@ -19,7 +19,7 @@ from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
 SLOWEST = (
-    1e-8  # m/s, chosen: below it the tangent of a root is too steep to compute with; wheels turn
+    1e-13  # m/s, chosen: below it the tangent of a root is too steep to compute with; wheels turn
 )
 # fast even at that speed where a path turns in no length
 

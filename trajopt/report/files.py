@@ -29,9 +29,12 @@ def write_bytes(file: FilePath, content: bytes) -> None:
 
 def write_json(file: FilePath, content: dict[str, Any]) -> None:
     """Write JSON, indented; numbers that are not finite become null."""
-    write_text(
-        file, json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    )
+    write_text(file, json_text(content))
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """JSON, indented; numbers that are not finite become null."""
+    return json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_sealed(file: FilePath, content: dict[str, Any]) -> None:
@@ -68,7 +71,7 @@ def read_sealed(file: FilePath, version: int) -> dict[str, Any]:
 
 def finite(value: Any) -> Any:
     """The same content in JSON's types, with None for numbers that are not finite."""
-    if isinstance(value, dict):
+    if isinstance(value, Mapping):
         return {str(key): finite(part) for key, part in value.items()}
     if isinstance(value, (list, tuple)):
         return [finite(part) for part in value]

@@ -11,13 +11,15 @@ of f the bound of ``relaxed`` holds.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.limits.limit import Limit, is_linear
+from trajopt.limits.power import Power
 from trajopt.limits.torques import SLOWEST
+from trajopt.paths.samples import PathSamples
 from trajopt.timing.cells import Measure, Readable, Source, Spots, Table, per_sigma
 from trajopt.timing.planar import planar_of
 from trajopt.timing.track import Track
@@ -33,6 +35,7 @@ class Curved:
     steady: Source | None
     straight: IndexArray
     bent: IndexArray
+    _last: dict[Spots, PathSamples] = field(default_factory=dict)
 
     def edges(self, track: Track, u: Array) -> tuple[float, ...]:
         """Path parameters where the linear limits jump or bend, m."""
@@ -85,12 +88,29 @@ class Curved:
         scale = np.where(slow, rest[3], scale)
         return _with(table, a / scale, b / scale, c / scale)
 
+    def roots(
+        self, track: Track, measure: Measure, spots: Spots, between: tuple[Array, Array]
+    ) -> tuple[Array, Array, Array]:
+        """a, b, c (P, Q) of rows (y^(3/2))' <= 2 (c - b y^(3/2)) / a where a > 0, >= where a < 0, for y
+        from low (P,) to high (P,): a power a u + b y + c <= P / sqrt(y), times 3 sqrt(y) / a."""
+        samples = self._samples(track, spots)
+        g, slope = measure.stretch(spots.u)
+        found = []
+        for limit in (self.limits[int(k)] for k in self.bent):
+            if not isinstance(limit, Power):
+                continue
+            a, b, c = (v[:, 0] for v in vars(limit.work(samples, track.robot)).values())
+            least = limit.largest * g - np.minimum(c * np.sqrt(between[0]), c * np.sqrt(between[1]))
+            rows = a / g, 1.5 * (b - a * slope / g) / (g * g), 1.5 * least
+            found.append(np.stack(rows) / (limit.largest * g))
+        a, b, c = np.stack(found, axis=-1) if found else np.zeros((3, len(g), 0))
+        return a, b, c
+
     def _rows(
         self, track: Track, measure: Measure, spots: Spots, y: Array | None
     ) -> tuple[Array, Array, Array, Array, Array, IndexArray]:
         """a, b, c, scale (P, R) of the bent limits at y, bounds (B, P) and owner (R,)."""
-        s = track.path.parameter(spots.u)
-        samples = track.samples(s, spots.u)
+        samples = self._samples(track, spots)
         if y is not None:
             g, _ = measure.stretch(spots.u)
             samples = replace(samples, sd2=y / (g * g))
@@ -100,8 +120,19 @@ class Curved:
         )
         owner = np.repeat(np.arange(len(rows)), [r.a.shape[1] for r in rows])
         bounds = np.stack([r.sd2_max for r in rows])
-        a, b, bounds = per_sigma(measure, spots.u, s, a, b, bounds)
+        a, b, bounds = per_sigma(measure, spots.u, samples.s, a, b, bounds)
         return a, b, c, scale, bounds, owner
+
+    def _samples(self, track: Track, spots: Spots) -> PathSamples:
+        """At the places asked for last, which are asked for many times."""
+        if spots not in self._last:
+            self._last.clear()
+            found = track.samples(track.path.parameter(spots.u), spots.u)
+            wheels = found.wheels
+            self._last[spots] = replace(
+                found, wheel_states=None if wheels is None else lambda: wheels
+            )
+        return self._last[spots]
 
 
 def _with(table: Table, a: Array, b: Array, c: Array) -> Table:

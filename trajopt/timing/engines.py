@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from trajopt.arrays import Array
-from trajopt.errors import ArgumentError, MissingDependencyError
+from trajopt.arrays import Array, require_choice
+from trajopt.errors import MissingDependencyError
 from trajopt.timing.bounds import bounds_profile, only_bounds
 from trajopt.timing.compiled import compiled_profile, is_compiled
 from trajopt.timing.stages import Stages
@@ -44,7 +44,6 @@ def pick_engine(name: str, stages: Stages) -> str:
 def require_engine(name: str) -> None:
     """Raises ArgumentError for an unknown engine, MissingDependencyError for one that is not
     installed."""
-    if name not in (*OTHERS, *ENGINES):
-        raise ArgumentError("engine", name, "one of " + ", ".join((*OTHERS, *ENGINES)))
+    require_choice("engine", name, (*OTHERS, *ENGINES))
     if name == "compiled" and not is_compiled():
         raise MissingDependencyError("numba", "speed", "engine='compiled'")

@@ -40,6 +40,7 @@ _SETTLED = 1e-6  # relative change of y that ends the tangents: the next is its 
 _MOST_TANGENTS = 100  # chosen: 6 are usual
 _SMALL = 1e-3  # of the largest y, chosen: below it, rounding counts more than what is gained
 _STILL = 1e-6  # relative change of a guess that ends the search for a better one; chosen
+_TOWARDS_REST = 0.5 ** np.arange(1, 13)  # of a cell; chosen: what is left is 1e-4 of its time
 _FALL = 4.0  # most by which a guess of y falls at once: rows near rest allow a few times as much
 _UNKNOWN = 1.0  # m^2/s^2, guess where only bent limits bound the motion; chosen
 _CHORDS = 6  # rounds of chords, each with what the last left; chosen
@@ -101,6 +102,7 @@ def fastest(ask: Ask, source: Source, u: Array, jumps: Array) -> Found:
     """On the grid u (N+1,), refined as the gap or broken rows ask for. Raises Stuck,
     InfeasibleError."""
     measure = Measure.of(ask.track)
+    u = _graded_at_rest(ask, u)
     best: Found | None = None
     gaps: list[float] = []
     for done in range(_REFINEMENTS + 1):
@@ -350,6 +352,19 @@ def _from_rest(ask: Ask, cells: Cells) -> BoolArray:
     return found
 
 
+def _graded_at_rest(ask: Ask, u: Array) -> Array:
+    """The grid with cells next to rest halved towards it, where a limit leaves any force there:
+    speeds grow with the cube root of the way, or fall at once."""
+    if not any(getattr(limit, "free_at_rest", False) for limit in ask.limits):
+        return u
+    rests = np.concatenate([u[[0, -1]][[ask.start == 0, ask.end == 0]], ask.stops])
+    at = np.searchsorted(u, rests - 1e-12 * (u[-1] - u[0]))
+    near = np.concatenate(
+        [np.stack([u[at], u[np.clip(at + k, 0, len(u) - 1)]], 1) for k in (-1, 1)]
+    )
+    return np.unique(np.append(u, near[:, :1] + np.diff(near) * _TOWARDS_REST))
+
+
 def _near(new: Array, old: Array, share: float) -> bool:
     return bool(np.all(np.abs(new - old) <= share * (new + _SMALL * new.max())))
 
@@ -405,25 +420,31 @@ def _excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]
 def _bound(ask: Ask, cells: Cells, source: Source, profile: Profile) -> tuple[float, Array]:
     """Least time of any motion, s, and each cell's share of it; ``cells`` have rows of bent limits at
     rest."""
+    high = np.minimum(cells.cap, SD2_CAP)
     if not isinstance(source, Curved):
-        total, seconds, _ = _relaxed(ask, cells)
+        none = np.zeros((len(high), 0))
+        total, seconds, _ = _relaxed(ask, cells, (none, none, none))
         return total, seconds
     low = between(cells, profile.y, profile.first, profile.last)
-    where = ask.track, profile.measure, cells.spots, cells.table
-    total, seconds, high = _relaxed(ask, cells)
+    where = ask.track, profile.measure, cells.spots
+    roots = source.roots(*where, (low, np.maximum(high, low)))
+    total, seconds, high = _relaxed(ask, cells, roots)
     for _ in range(_CHORDS):
-        table = source.chord(*where, (low, np.maximum(high, low)))
+        ends = low, np.maximum(high, low)
+        table, roots = source.chord(*where, cells.table, ends), source.roots(*where, ends)
         before = total
-        total, seconds, upper = _relaxed(ask, replace(cells, table=table))
+        total, seconds, upper = _relaxed(ask, replace(cells, table=table), roots)
         high = np.minimum(high, upper)
         if total - before <= (ask.gap or 0.0) / 20 * total:
             break
     return total, seconds
 
 
-def _relaxed(ask: Ask, cells: Cells) -> tuple[float, Array, Array]:
-    """Least time of any motion that keeps the rows, s, each cell's share, and y (P,) that no motion
-    exceeds."""
+def _relaxed(
+    ask: Ask, cells: Cells, roots: tuple[Array, Array, Array]
+) -> tuple[float, Array, Array]:
+    """Least time of any motion that keeps the rows and ``roots`` (``Curved.roots``), s, each cell's
+    share, and y (P,) that no motion exceeds."""
     from trajopt.timing import relaxed
 
     table = cells.table
@@ -437,6 +458,7 @@ def _relaxed(ask: Ask, cells: Cells) -> tuple[float, Array, Array]:
         table.a,
         table.b,
         table.c,
+        *roots,
         top,
         _nodes(ask, cells, top),
         *_ends(ask, cells),

@@ -49,6 +49,8 @@ def time_scale_many(
     Raises ArgumentError where the numbers of paths and limits do not fit, TypeError for options that
     ``time_scale`` has not.
     """
+    if executor is not None and not isinstance(executor, Executor):
+        raise ArgumentError("executor", executor, "a concurrent.futures.Executor, or None")
     jobs = _jobs(paths, limits)
     run = partial(_timed, options)
     # The first one here: kernels are compiled and tables made once, not by all workers at a time.
@@ -94,11 +96,12 @@ def _jobs(
 
 
 def _listed(name: str, values: Iterable[Any]) -> list[Any]:
-    if isinstance(values, (str, bytes)) or not isinstance(values, Iterable):
-        raise ArgumentError(name, values, f"a list of {name}")
-    found = list(values)
+    try:
+        found = [] if isinstance(values, (str, bytes)) else list(values)
+    except TypeError:
+        found = []
     if not found:
-        raise ArgumentError(name, found, f"at least one of the {name}")
+        raise ArgumentError(name, values, f"a list of {name}, at least one")
     return found
 
 

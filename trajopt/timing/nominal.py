@@ -8,11 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import require_positive
+from trajopt.arrays import as_numbers, require_positive
+from trajopt.errors import ArgumentError
 from trajopt.limits.limit import Limit
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.timing.grid import initial_grid
+from trajopt.timing.job import FASTEST, require_given
 from trajopt.timing.linear import linear_profile
 from trajopt.timing.track import track
 from trajopt.timing.trajectory import Trajectory
@@ -35,7 +37,9 @@ def nominal_timing(
     The motion neither starts nor ends at rest. ``start_wheels`` (W,): wheel angles at the start,
     rad; () for zeros; ``start_steering`` as in ``time_scale``. Raises ArgumentError for a duration that is not positive.
     """
-    require_positive("duration", duration, "s")
+    require_given(path, limits, robot, ground)
+    if require_positive("duration", duration, "s") < path.length / FASTEST:
+        raise ArgumentError("duration", duration, f"{path.length / FASTEST:.3g} s or more")
     along = track(path, robot, ground, start_steering)
     path = along.path
     u = initial_grid(path, None)
@@ -54,6 +58,6 @@ def nominal_timing(
         np.diff(sd2) / (2 * np.diff(s)),
         "nominal",
         1.0,
-        np.asarray(start_wheels, dtype=np.float64),
+        as_numbers("start_wheels", start_wheels, "wheel angles, rad"),
         along.start_steering,
     )

@@ -32,15 +32,16 @@ def u_range(a: Array, b: Array, c: Array, j: int, y: float) -> tuple[float, floa
 @kernel(nogil=True)
 def _pinch(
     a: Array, b: Array, c: Array, j: int, k: int, d: float, low: float, high: float, y: float
-) -> tuple[float, float, float, float]:
-    """Gap between the bounds on u at y and its slope, and the bounds that flat rows set on y, of
-    place j alone (d = 0) or of a cell from j to k with constant u that ends in [low, high]."""
-    n_up, p_up, q_up = 0.0, 0.0, 0.0
-    n_low, p_low, q_low = 0.0, 0.0, 0.0
+) -> tuple[float, float, float, float, float]:
+    """Gap between the bounds on u at y, its slope, the y where the two meet, and the bounds that flat
+    rows set on y, of place j alone (d = 0) or of a cell from j to k with constant u that ends in
+    [low, high]."""
+    n_up, p_up, q_up, c_up = 0.0, 0.0, 0.0, 0.0
+    n_low, p_low, q_low, c_low = 0.0, 0.0, 0.0, 0.0
     ends = 1
     if d > 0:
-        n_up, p_up, q_up = high - y, 2 * d, 1.0
-        n_low, p_low, q_low = low - y, 2 * d, 1.0
+        n_up, p_up, q_up, c_up = high - y, 2 * d, 1.0, high
+        n_low, p_low, q_low, c_low = low - y, 2 * d, 1.0, low
         ends = 2
     y_max, y_min = np.inf, -np.inf
     for end in range(ends):
@@ -51,10 +52,10 @@ def _pinch(
             n = c[i, r] - q * y
             if p > FLAT:
                 if p_up == 0 or n * p_up < n_up * p:
-                    n_up, p_up, q_up = n, p, q
+                    n_up, p_up, q_up, c_up = n, p, q, c[i, r]
             elif p < -FLAT:
                 if p_low == 0 or n * p_low < n_low * p:  # n/p > n_low/p_low with p < 0 < p_low
-                    n_low, p_low, q_low = -n, -p, -q
+                    n_low, p_low, q_low, c_low = -n, -p, -q, -c[i, r]
             elif q > FLAT:
                 y_max = min(y_max, c[i, r] / q)
             elif q < -FLAT:
@@ -62,12 +63,15 @@ def _pinch(
             elif c[i, r] < -_TOUCH:
                 y_max = -np.inf
     if p_up == 0 or p_low == 0:
-        return np.inf, 0.0, y_max, y_min
+        return np.inf, 0.0, np.nan, y_max, y_min
     upper, lower = n_up / p_up, n_low / p_low
     gap = upper - lower
     if gap < 0 and gap >= -_TOUCH * (abs(upper) + abs(lower)):
         gap = 0.0
-    return gap, q_low / p_low - q_up / p_up, y_max, y_min
+    slope = q_low / p_low - q_up / p_up
+    # Not y - gap / slope: from far away that leaves no digits where y is small.
+    meet = (c_low / p_low - c_up / p_up) / slope if slope != 0 else np.nan
+    return gap, slope, meet, y_max, y_min
 
 
 @kernel(nogil=True)
@@ -88,7 +92,7 @@ def end_of_feasible(
     down = first >= last
     y = first
     for _ in range(4 * a.shape[1] + 50):
-        gap, slope, y_max, y_min = _pinch(a, b, c, j, k, d, low, high, y)
+        gap, slope, step, y_max, y_min = _pinch(a, b, c, j, k, d, low, high, y)
         if y_max < y - _TOUCH * abs(y):
             if not down:
                 return np.nan
@@ -102,7 +106,6 @@ def end_of_feasible(
                 return y
             if (slope >= 0) if down else (slope <= 0):
                 return np.nan
-            step = y - gap / slope
             if step == y:
                 return y
             y = step

@@ -7,6 +7,10 @@ end of a cell backward. Leaving rows out leaves a bound, so in each cell the two
 by the trapezoidal rule are integrated, and of those only rows that are not stiff. Below these and
 below the speed that the rows allow at all, the profile is nowhere faster; what such a profile would
 take is the bound.
+
+A bound on power, a u + b y <= P / sqrt(y), leaves any force at rest. Times 3 sqrt(y) it says of
+x = y^(3/2) what other rows say of y, x' <= 3 (P - b x) / a: a run at constant power is integrated
+exactly, from rest on, and takes the time of x.
 """
 
 from __future__ import annotations
@@ -81,6 +85,38 @@ def _least(
 
 
 @kernel(nogil=True)
+def _least_root(
+    a: Array, b: Array, c: Array, sign: float, j: int, m: int, k: int, h: float, y: float
+) -> tuple[float, float]:
+    """Bounds on x = y^(3/2) in the middle and at the far end of a cell entered at place j with at
+    most y, by the row that leaves least."""
+    middle = end = np.inf
+    for r in range(a.shape[1]):
+        low, high = np.inf, 0.0
+        for i in (j, m, k):
+            low, high = min(low, sign * a[i, r]), max(high, sign * a[i, r])
+        if low <= _FLAT or high > _VARIES * low:
+            continue
+        if h * max(abs(b[j, r]), abs(b[m, r]), abs(b[k, r])) > _STIFF * low:
+            continue
+        half, whole = _through(a, b, c, sign, j, m, k, h, y**1.5, r)
+        if whole < end:
+            middle, end = half, whole
+    return max(middle, 0.0), max(end, 0.0)
+
+
+@kernel(nogil=True)
+def _root_time(h: float, x: Array, half: int) -> float:
+    """Seconds over one half (0, 1) of a cell, of length h, with y^(3/2) at most ``x`` (3,) at its
+    ends and in its middle; 0 where nothing bounds it."""
+    if np.isinf(x[0]) or np.isinf(x[1]) or np.isinf(x[2]):
+        return 0.0
+    bend = max(2 * x[1] - x[0] - x[2], 0.0) / 12
+    p, q = (x[half] + bend) ** (1 / 3), (x[half + 1] + bend) ** (1 / 3)
+    return 1.5 * h * (p + q) / (p * p + p * q + q * q) if p + q > 0 else np.inf
+
+
+@kernel(nogil=True)
 def _least_time(h: float, lines: Array) -> float:
     """Seconds over length h with y at the least of three lines, given at their ends (3, 2)."""
     # Breaks are where two lines cross.
@@ -122,6 +158,9 @@ def lower_bound(
     a: Array,
     b: Array,
     c: Array,
+    root_a: Array,
+    root_b: Array,
+    root_c: Array,
     top: Array,
     node: Array,
     start: float,
@@ -131,26 +170,35 @@ def lower_bound(
 ) -> float:
     """Least time, s, of any motion from y = ``start`` to ``end``; fills seconds (N,), each cell's
     share of it, and upper (P,), above which y of no motion lies at the ends and in the middles of
-    cells. ``top`` (P,) bounds y at places, ``node`` (N+1,) at gridpoints."""
+    cells. ``top`` (P,) bounds y at places, ``node`` (N+1,) at gridpoints; rows ``root_a``, .. (P, Q)
+    bound y^(3/2) as the others do y."""
     count = len(d)
     ahead, back = np.empty((count, 3)), np.empty((count, 3))
+    rise, fall = np.empty((count, 3)), np.empty((count, 3))
     y = start
     for i in range(count):
-        ahead[i, 0] = y = min(y, top[left[i]])
-        ahead[i, 1], ahead[i, 2] = _least(a, b, c, 1.0, left[i], middle[i], right[i], d[i], y)
-        y = min(min(ahead[i, 2], top[right[i]]), node[i + 1])
+        j, m, k = left[i], middle[i], right[i]
+        ahead[i, 0] = y = min(y, top[j])
+        rise[i, 0] = y**1.5
+        ahead[i, 1], ahead[i, 2] = _least(a, b, c, 1.0, j, m, k, d[i], y)
+        rise[i, 1], rise[i, 2] = _least_root(root_a, root_b, root_c, 1.0, j, m, k, d[i], y)
+        y = min(min(ahead[i, 2], rise[i, 2] ** (2 / 3)), min(top[k], node[i + 1]))
     y = end
     for i in range(count - 1, -1, -1):
-        back[i, 2] = y = min(y, top[right[i]])
-        back[i, 1], back[i, 0] = _least(a, b, c, -1.0, right[i], middle[i], left[i], d[i], y)
-        y = min(min(back[i, 0], top[left[i]]), node[i])
+        j, m, k = left[i], middle[i], right[i]
+        back[i, 2] = y = min(y, top[k])
+        fall[i, 2] = y**1.5
+        back[i, 1], back[i, 0] = _least(a, b, c, -1.0, k, m, j, d[i], y)
+        fall[i, 1], fall[i, 0] = _least_root(root_a, root_b, root_c, -1.0, k, m, j, d[i], y)
+        y = min(min(back[i, 0], fall[i, 0] ** (2 / 3)), min(top[j], node[i]))
     total = 0.0
     lines = np.empty((3, 2))
     for i in range(count):
         tops = (top[left[i]], top[middle[i]], top[right[i]])
         for n in range(3):
             j = left[i] + 2 * n if n < 2 else right[i]
-            upper[j] = min(min(ahead[i, n], back[i, n]), tops[n])
+            root = min(rise[i, n], fall[i, n]) ** (2 / 3)
+            upper[j] = min(min(ahead[i, n], back[i, n]), min(tops[n], root))
         bends = np.zeros(3)  # how far a curve that bends down rises above its chords
         for n in range(3):
             e0, e1, e2 = (
@@ -166,6 +214,7 @@ def lower_bound(
                 lines[0, n] = ahead[i, half + n] + bends[0]
                 lines[1, n] = back[i, half + n] + bends[1]
                 lines[2, n] = tops[half + n] + bends[2]
-            seconds[i] += _least_time(d[i] / 2, lines)
+            by_root = max(_root_time(d[i] / 2, rise[i], half), _root_time(d[i] / 2, fall[i], half))
+            seconds[i] += max(_least_time(d[i] / 2, lines), by_root)
         total += seconds[i]
     return total

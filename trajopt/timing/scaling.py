@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from trajopt.arrays import Array, require_positive
-from trajopt.errors import ArgumentError, InfeasibleError
+from trajopt.arrays import Array, require_choice, require_positive
+from trajopt.errors import InfeasibleError
 from trajopt.limits.limit import Limit, is_linear
 from trajopt.paths.path import Path
 from trajopt.paths.samples import require_moving
@@ -86,8 +86,7 @@ def time_scale(
     job = checked_job(path, limits, robot, ground, speeds, engine, stops, start)
     if gap is not None:
         require_positive("gap", gap, "(a share of the duration), or None")
-    if too_fast not in ("refuse", "brake"):
-        raise ArgumentError("too_fast", too_fast, "refuse or brake")
+    require_choice("too_fast", too_fast, ("refuse", "brake"))
     second_order = is_second_order(engine)
     if second_order and not job.track.steers and too_fast == "refuse" and job.drives_anywhere():
         require_moving(job.path)

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from trajopt.arrays import Array, BoolArray, require_positive
+from trajopt.arrays import Array, BoolArray, require_between, require_choice
 from trajopt.errors import ArgumentError
 from trajopt.timing.engines import ENGINES, pick_engine
 from trajopt.timing.stages import Stages, fine_rows, stages_of
@@ -24,13 +24,10 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
     Raises ArgumentError for a trajectory that is not time-optimal (linear, segments), or a change
     that is not > 0.
     """
-    require_positive("change", change, "(a share, as 0.01 for one percent)")
-    if trajectory.engine not in ENGINES:
-        raise ArgumentError(
-            "trajectory.engine",
-            trajectory.engine,
-            "a time-optimal trajectory: " + ", ".join(ENGINES),
-        )
+    require_between("change", change, 0, 10, "(a share, as 0.01 for one percent)")
+    if not isinstance(trajectory, Trajectory):
+        raise ArgumentError("trajectory", trajectory, "a Trajectory, as time_scale gives it")
+    require_choice("trajectory.engine", trajectory.engine, ENGINES)
     fine = fine_rows(trajectory.track, trajectory.u, trajectory.limits, trajectory.sd**2)
     stages = stages_of(fine)
     stopped = np.repeat(trajectory.sd <= 0, 2)[1:-1]
