@@ -16,6 +16,7 @@ from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples
+from trajopt.paths.segments import Clothoid
 from trajopt.robots.robot import robot
 from trajopt.routes.bspline import as_path, knots_of
 from trajopt.routes.cells import kind_of, shared_numbers, symbols_of
@@ -185,11 +186,8 @@ def test_rows_of_a_car_follow_its_curvature() -> None:
     body, slip = robot("car"), Slip(0.6, rule="least_norm")
     envelope = envelope_of(body, (slip,), False)
     assert envelope.cones.shape[1] > 1
-    for bend in np.linspace(-0.7, 0.7, 6) * envelope.curvature:
-        angle = np.linspace(0.0, 0.6, 9)
-        sign = np.copysign(1.0, bend)
-        circle = np.column_stack([np.sin(angle), sign * (1 - np.cos(angle))]) / abs(bend)
-        path = Path.through(circle)
+    for bend in np.linspace(-0.95, 0.95, 6) * envelope.curvature:
+        path = Path.segments([Clothoid(1.0, bend, bend)], start=(0.0, 0.0, 0.0))
         s = np.full(5, path.length / 2)
         samples = track(path, body).samples(s, path.locate(s))
         motion = np.linspace(-1.0, 1.0, 5), np.full(5, 1.0)

@@ -228,7 +228,7 @@ def _keep_forces(
     at = _FIXED + 7 * len(kind.norms)
     for rows, count in ((4, kind.cones), (1, kind.planes)):
         for _ in range(count):
-            value = 0
+            value: Any = 0
             for power in range(kind.powers):
                 matrix = ca.reshape(shared[at : at + 4 * rows], 4, rows).T
                 value, at = value + end.bend**power * (matrix @ w), at + 4 * rows

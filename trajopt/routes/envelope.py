@@ -28,6 +28,7 @@ from trajopt.limits.wheel_speed import WheelSpeed
 from trajopt.limits.yaw_rate import YawRate
 from trajopt.paths.path import Path
 from trajopt.paths.samples import PathSamples
+from trajopt.paths.segments import Clothoid
 from trajopt.robots.robot import Robot
 from trajopt.robots.steering import steering_of
 from trajopt.timing.track import track
@@ -37,10 +38,8 @@ from trajopt.world.plane import Plane
 SHARPEST = 2.0  # of curvature, times the turning length; chosen: wheels then hardly reverse
 SHARE = 0.98  # of the largest steering angle that routes use; chosen, so that rounding breaks none
 _POWERS = 5  # of curvature in rows of robots that steer; chosen: 1e-3 of friction
-_READ = 0.75  # of the sharpest curvature: a spline through a circle is sharper next to its ends
 _MOST_ROWS = 16  # of one limit, that are written one by one; chosen: more become an ellipsoid
 _MOST = 1e3  # m/s, m/s^2: no bound
-_FLATTEST = 1e-6  # 1/m: a straight line
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,9 +75,15 @@ class Envelope:
     def bare(self) -> Envelope:
         """Of the geometry alone: without what depends on speeds."""
         none = np.zeros((0, 3))
-        rates = {"first": none, "second": none, "changes": np.zeros(0), "turning": np.inf}
-        forces = {"cones": np.zeros((0, 1, 4, 4)), "planes": np.zeros((0, 1, 4))}
-        return replace(self, **rates, **forces)
+        return replace(
+            self,
+            cones=np.zeros((0, 1, 4, 4)),
+            planes=np.zeros((0, 1, 4)),
+            first=none,
+            second=none,
+            changes=np.zeros(0),
+            turning=np.inf,
+        )
 
 
 def envelope_of(
@@ -183,10 +188,7 @@ def _along(robot: Robot, limits: Sequence[Acceleration]) -> tuple[float, float]:
 def _probe(robot: Robot, curvature: float) -> PathSamples:
     """Four samples with steered wheels as on a circle; a unit acceleration along, across and in yaw,
     and none, under gravity straight down."""
-    radius = 1 / max(abs(curvature), _FLATTEST)
-    angle = np.linspace(0.0, min(1.0, 1.0 / radius), 9)
-    bent = np.column_stack([np.sin(angle), np.sign(curvature) * (1 - np.cos(angle))])
-    path = Path.through(radius * bent)
+    path = Path.segments([Clothoid(1.0, curvature, curvature)], start=(0.0, 0.0, 0.0))
     s = np.full(4, path.length / 2)
     steers = len(steering_of(robot).steered) > 0  # else wheels, castors too, as they are drawn
     found = track(path, robot if steers else None).samples(s, path.locate(s))
@@ -199,7 +201,7 @@ def _probe(robot: Robot, curvature: float) -> PathSamples:
 def _forces(robot: Robot, limits: Sequence[Limit], sharpest: float) -> tuple[Array, Array]:
     """``cones`` and ``planes`` of an envelope, fitted from curvatures up to ``sharpest``."""
     nodes = np.cos(np.pi * (np.arange(_POWERS) + 0.5) / _POWERS)
-    probes = [_probe(robot, float(k)) for k in (_READ * sharpest * nodes if sharpest else [0.0])]
+    probes = [_probe(robot, float(k)) for k in (sharpest * nodes if sharpest else [0.0])]
     cones, planes = list[Array](), list[Array]()
     for probe in probes:
         found = [_read(limit, probe, robot) for limit in limits]

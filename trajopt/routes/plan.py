@@ -43,7 +43,8 @@ CLOSE = 1.06  # times the least duration of two stages: slower ways are not trie
 _SPACING = 0.8  # of the outline's longer side, between control points; chosen
 _FEWEST, _MOST, _STEP = 10, 64, 6  # control points, and the step between numbers of them
 LONGER = 1.15  # times the shortest way: longer ones are not made smooth
-_LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; added to what lacks
+_LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; more of it where it lacks
+_ROOMY = 0.8  # of the room beside a disc: what discs may keep when a path is known; chosen
 _TIGHT = 0.5  # of the room beside a disc in the narrowest place: what discs may keep there
 _TRUST = 0.25  # of what discs leave of the outline, kept from the start; chosen: seldom too little
 _ROUNDED = 1.8  # times that room: spacing of a field whose spline does not round a ridge off
@@ -217,30 +218,44 @@ def _speeds(trajectory: Trajectory, nodes: int) -> Array:
 def _free(
     job: _Job, near: Field, rooms: Array, way: Way, start: Solved, method: Method
 ) -> tuple[Attempt, Solved]:
-    """The program's path and its timing. ``rooms`` (N-1,), m, of discs at the inner nodes grow where
-    the outline itself needs more."""
-    from scipy.ndimage import maximum_filter1d
-
+    """The program's path and its timing. ``rooms`` (N-1,), m, of discs at the inner nodes become
+    what the outline needs there."""
     whole = method == "one program"
     weights = Weights(1.0) if whole else Weights(0.0, 1.0, BEND)
     envelope = job.envelope if whole else job.envelope.bare
     program = program_of(kind_of(envelope), len(start.points), len(job.discs.radii))
     attempt, solved, goal = Attempt(way, method), start, job.clearance - _EXACT
-    footprint, keep_out = job.robot.footprint, job.scene.keep_out
-    u = np.arange(1, len(rooms) + 1) / CELLS
+    more = np.zeros(len(rooms))
     for _ in range(_TRIES):
         solved = program.solve(solved, job.ends, envelope, job.discs, near, weights, rooms)
         path = as_path(solved.points, job.robot.turning_length)
-        found = path_clearance(path, footprint, keep_out, enough=goal)
+        found = path_clearance(path, job.robot.footprint, job.scene.keep_out, enough=goal)
         if found.bound >= goal:
             return _timed(job, replace(attempt, path=path, clearance=found)), solved
         attempt = replace(attempt, why=f"{found}; IPOPT: {solved.status}")
-        lacks = job.clearance - outline_distances(path, u, footprint, keep_out)[0]
-        worst = np.argmin(np.abs(path.parameter(u) - found.s))
-        lacks[worst] = max(lacks[worst], job.clearance - found.distance)
-        lacks = maximum_filter1d(lacks, 2 * _BESIDE + 1)
-        rooms += np.where(lacks > 0, lacks + _MORE, 0.0)
+        rooms[:] = _rooms(job, near, path, found, more)
     return attempt, solved
+
+
+def _rooms(job: _Job, near: Field, path: Path, found: Clearance, more: Array) -> Array:
+    """(N-1,): what discs have to keep at the inner nodes so that the outline keeps the clearance: by
+    as much more as they are farther off than it here, as far as there is room; and ``more``, which
+    grows where it lacks."""
+    from scipy.ndimage import maximum_filter1d
+
+    u = np.arange(1, len(more) + 1) / CELLS
+    places, yaw = path.position(u)[:, :2], path.yaw(u)
+    centres = outlines_at(places, yaw, job.discs.centres)
+    discs = near.smooth(centres.reshape(-1, 2))[0].reshape(len(u), -1) - job.discs.radii
+    own = outline_distances(path, u, job.robot.footprint, job.scene.keep_out)[0]
+    lacks = job.clearance - own
+    worst = np.argmin(np.abs(path.parameter(u) - found.s))
+    lacks[worst] = max(lacks[worst], job.clearance - found.distance)
+    more += np.where(maximum_filter1d(lacks, 2 * _BESIDE + 1) > 0, _MORE, 0.0)
+    excess = maximum_filter1d(discs.min(axis=1) - own, 2 * _BESIDE + 1)
+    slack = near.roomiest(places) - job.discs.inner[2] - job.clearance
+    most = np.clip(_ROOMY * slack, _LEAST, 2 * job.discs.gap)
+    return np.asarray(job.clearance + np.clip(excess, _LEAST, most) + more)
 
 
 def _near(job: _Job, field: Field, way: Way) -> tuple[Field, float]:
