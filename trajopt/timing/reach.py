@@ -18,7 +18,7 @@ import numpy as np
 
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.kernels import kernel
-from trajopt.timing.ranges import FLAT, end_of_feasible, u_range
+from trajopt.timing.ranges import FLAT, end_of_feasible, meeting, u_range
 
 _NEAR = 1e-3  # of a row's scale: values that far below are no peaks that count; chosen
 
@@ -41,6 +41,7 @@ def backward(
     """Fills sets (N+1, 2), the y from which sets[-1] can be reached; ``node`` (N+1,) is a bound on
     y at gridpoints. Cells that need it become constant. Returns the gridpoint whose set is empty,
     or -1."""
+    up = lower = -1
     for i in range(len(d) - 1, -1, -1):
         j, k, h = left[i], right[i], d[i]
         low, high = sets[i + 1, 0], min(sets[i + 1, 1], top[k])
@@ -81,12 +82,13 @@ def backward(
                 sets[i, 0], sets[i, 1] = below, above
                 continue
             constant[i] = True
-        above = end_of_feasible(a, b, c, j, k, h, low, high, cap, floor)
+        cap = max(meeting(a, b, c, j, k, h, low, high, up, lower, cap), floor)
+        above, up, lower = end_of_feasible(a, b, c, j, k, h, low, high, cap, floor)
         if np.isnan(above):
             return i
         below = floor
         if eased:
-            below = end_of_feasible(a, b, c, j, k, h, low, high, floor, above)
+            below, _, _ = end_of_feasible(a, b, c, j, k, h, low, high, floor, above)
             if np.isnan(below):
                 below = above
         sets[i, 0], sets[i, 1] = below, above
