@@ -49,9 +49,9 @@ docs: $(READY)  ## the documentation as a site, out/docs/index.html
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs out/docs
 
 schema: $(READY)  ## rewrite the JSON schemas of problem, robot and sweep files
-	$(BIN)/trajopt schema problem --out problems/problem.schema.json
-	$(BIN)/trajopt schema robot --out trajopt/robots/robot.schema.json
-	$(BIN)/trajopt schema sweep --out problems/sweeps/sweep.schema.json
+	$(BIN)/trajopt schema problem --out problems/problem.schema.json --force
+	$(BIN)/trajopt schema robot --out trajopt/robots/robot.schema.json --force
+	$(BIN)/trajopt schema sweep --out problems/sweeps/sweep.schema.json --force
 
 sheet: $(READY)  ## every figure on one sheet, out/contact_sheet.png, to be looked at
 	$(BIN)/python -m benchmarks.contact_sheet

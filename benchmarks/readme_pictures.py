@@ -24,9 +24,11 @@ from trajopt.sweeps.store import open_store
 
 FOLDER = Path("docs/pictures")
 PROBLEM = Path("problems/smdw/scenario_1_lateral.toml")
-# Of docs/ground.md: problem, picture of its run folder, name here.
+# Of docs/ground.md and docs/paths.md: problem, picture of its run folder, name here.
 ON_GROUND = (
     (Path("problems/car/hill.toml"), "loads.png", "hill_loads.png"),
+    (Path("problems/car/bay.toml"), "path.png", "bay.png"),
+    (Path("problems/car/bay.toml"), "path.png", "bay.png"),
     (Path("problems/asoc/field.toml"), "path.png", "field_path.png"),
 )
 

@@ -22,7 +22,6 @@ myst_heading_anchors = 3
 myst_enable_extensions = ["dollarmath"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_preserve_defaults = True
 toc_object_entries = False
 suppress_warnings = ["ref.python"]  # several rooms have a Motion
 

@@ -161,7 +161,7 @@ def test_every_command_takes_problem_and_folder_of_every_kind(file, tmp_path):
     told = {}
     for plan in (path, tmp_path / "run"):
         orders = tmp_path / "orders.csv"
-        for arguments in (("explain", plan), ("export", plan, "--out", orders)):
+        for arguments in (("explain", plan), ("export", plan, "--out", orders, "--force")):
             done = trajopt(*arguments)
             assert done.returncode == 0, done.stderr
         wheels = load_problem(ROOT / path).robot.wheel_names

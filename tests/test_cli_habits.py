@@ -6,6 +6,9 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
 
 import trajopt
 
@@ -55,3 +58,36 @@ def test_verbose_commands_say_where_an_error_comes_from() -> None:
         told = subprocess.run([*command, *more], capture_output=True, text=True).stderr
         assert ("Traceback" in told) == expected
         assert "error: nowhere.toml" in told
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("export", "problems/powerbot/experiment_1.toml", "--out"),
+        ("robot", "car", "--out"),
+        ("schema", "robot", "--out"),
+    ],
+)
+def test_files_are_not_written_over_unless_asked(tmp_path: Path, command: tuple[str, ...]) -> None:
+    file = tmp_path / {"robot": "car.toml"}.get(command[0], "file.json")
+    file.write_text("mine")
+    words = [sys.executable, "-m", "trajopt", *command, str(file)]
+    refused = subprocess.run(words, capture_output=True, text=True)
+    assert refused.returncode == 2
+    assert "--force" in refused.stderr
+    assert file.read_text() == "mine"
+    subprocess.run([*words, "--force"], check=True, capture_output=True)
+    assert file.read_text() != "mine"
+
+
+def test_examples_are_listed_and_copied(tmp_path: Path) -> None:
+    assert "docs/examples/own_limit.py" in run("examples")
+    run("examples", "--out", str(tmp_path))
+    assert (tmp_path / "problems" / "car" / "hill.toml").is_file()
+    told = subprocess.run(
+        [sys.executable, "-m", "trajopt", "examples", "--out", str(tmp_path)],
+        capture_output=True,
+        text=True,
+    )
+    assert told.returncode == 2
+    run("examples", "--out", str(tmp_path), "--force")

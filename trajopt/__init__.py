@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from trajopt.optimize.base import Budget, OptimizeResult, Status
     from trajopt.optimize.search import minimize
     from trajopt.paths.path import Path
+    from trajopt.paths.segments import Arc, Clothoid, Straight
     from trajopt.pipeline import solve, validate
     from trajopt.problem import Problem, load_problem
     from trajopt.refine.jerk import limit_jerk
@@ -48,8 +49,10 @@ __version__ = "0.1.0"
 # public name -> the module it lives in
 _HOME = {
     "Acceleration": "trajopt.limits.acceleration",
+    "Arc": "trajopt.paths.segments",
     "ArgumentError": "trajopt.errors",
     "Budget": "trajopt.optimize.base",
+    "Clothoid": "trajopt.paths.segments",
     "Flat": "trajopt.world.terrain",
     "InfeasibleError": "trajopt.errors",
     "MissingDependencyError": "trajopt.errors",
@@ -65,6 +68,7 @@ _HOME = {
     "SpeedZones": "trajopt.limits.speed_bound",
     "State": "trajopt.timing.states",
     "Status": "trajopt.optimize.base",
+    "Straight": "trajopt.paths.segments",
     "Tip": "trajopt.limits.tip",
     "Trajectory": "trajopt.timing.trajectory",
     "TrajoptError": "trajopt.errors",
@@ -87,8 +91,10 @@ _HOME = {
 
 __all__ = [
     "Acceleration",
+    "Arc",
     "ArgumentError",
     "Budget",
+    "Clothoid",
     "Flat",
     "InfeasibleError",
     "MissingDependencyError",
@@ -104,6 +110,7 @@ __all__ = [
     "SpeedZones",
     "State",
     "Status",
+    "Straight",
     "Tip",
     "Trajectory",
     "TrajoptError",

@@ -116,9 +116,10 @@ class Solution(Shown):
 
     @property
     def control_points(self) -> Array:
-        """(K, 3): x, y (m) and yaw (rad) of the path's points; yaw NaN along the path."""
+        """(K, 3): x, y (m) and yaw (rad) of the points that a spline is laid through; yaw NaN along
+        the path. None of them where there is no spline, or several."""
         path = self.problem.flat_path if self.problem.job.name == "path" else self.path
-        if path is None:
+        if path is None or (not path.plain and self.problem.job.name == "path"):
             return np.zeros((0, 3))
         points, heading = path.points[:, :2], path.heading
         yaw = np.full(len(points), np.nan) if heading is None else heading[: len(points)]

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import nbformat
+import pytest
 from nbclient import NotebookClient
 
 ROOT = Path(__file__).parents[2]
+BOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 SHOWN = {
     "problem": "import trajopt\nproblem = trajopt.load_problem('problems/smdw/scenario_1_lateral.toml')\nproblem",
     "robot": "problem.robot",
@@ -33,3 +35,20 @@ def test_results_show_facts_and_a_picture() -> None:
         assert "<table>" in html, name
         assert "data:image/png;base64," in html, name
         assert len(shown["data"]["text/plain"]) < 160, name
+
+
+@pytest.mark.parametrize("name", [path.stem for path in BOOKS])
+def test_shipped_notebooks_run(name: str) -> None:
+    book = nbformat.read(ROOT / "docs" / "notebooks" / f"{name}.ipynb", as_version=4)
+    NotebookClient(book, timeout=300, resources={"metadata": {"path": str(ROOT)}}).execute()
+    pictures = [
+        output
+        for cell in book.cells
+        for output in cell.get("outputs", ())
+        if "image/png" in output.get("data", {}) or "base64" in str(output.get("data", ""))
+    ]
+    assert pictures
+
+
+def test_there_are_three_notebooks() -> None:
+    assert len(BOOKS) >= 3

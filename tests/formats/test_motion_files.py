@@ -184,7 +184,7 @@ def test_a_problem_takes_a_race_line(car: Trajectory, tmp_path: Path) -> None:
     broken = (tmp_path / "line.csv").read_text().replace("; ", ", ", 30)
     (tmp_path / "line.csv").write_text(broken.replace("# s_m, x_m", "# s_m; x_m"))
     told = CliRunner().invoke(
-        app, ["export", str(tmp_path / "p.toml"), "--out", str(tmp_path / "o.json")]
+        app, ["export", str(tmp_path / "p.toml"), "--out", str(tmp_path / "again.json")]
     )
     assert "line.csv" in str(told.exception)
 

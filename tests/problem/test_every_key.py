@@ -20,6 +20,8 @@ from smdw_problems import ROOT
 
 from trajopt.errors import ArgumentError, ProblemError
 from trajopt.optimize.base import Budget
+from trajopt.paths.path import Path as Curve
+from trajopt.paths.segments import Arc, Clothoid, Straight
 from trajopt.pipeline import solve
 from trajopt.problem import Problem, load_problem
 from trajopt.problem.extensions import SECTIONS, entry
@@ -56,6 +58,17 @@ CAR = {
     "limits.speed_zones": [{"start": 1.0, "end": 2.0, "speed": 0.5}],
     "obstacles": None,
 }
+SEGMENTS: list[dict[str, Any]] = [
+    {"kind": "straight", "length": 0.3},
+    {"kind": "clothoid", "length": 0.3, "start": 0.0, "end": 0.4},
+    {"kind": "arc", "radius": 2.5, "angle": 0.1},
+    {"kind": "clothoid", "length": 0.3, "start": 0.4, "end": 0.0},
+]
+PIECES: list[dict[str, Any]] = [
+    {"points": [[0.0, 0.0], [0.6, 0.1], [1.0, 0.1]], "start_heading": 0.0, "start_rate": 1.0,
+     "goal_heading": 0.0, "goal_rate": 1.0},
+    {"drive": "backward", "start": [1.0, 0.1, np.pi], "segments": SEGMENTS},
+]  # fmt: skip
 PROFILE = {"profile": {"places": [0.0, 1.5], "speeds": [0.3, 0.4]}}
 
 
@@ -70,6 +83,8 @@ def bases() -> dict[str, Problem]:
         "path": straight,
         "free": straight.replace(FREE),
         "profile": straight.replace(PROFILE),
+        "segments": straight.replace({"path": {"start": [0.0, 0.0, 0.1], "segments": SEGMENTS}}),
+        "pieces": straight.replace({"path": {"pieces": PIECES}}),
         "climb": load_problem(PROBLEMS / "smdw" / "step_5cm.toml"),
         "car": straight.replace(CAR),
         "icy": on_ground(straight, friction_along={"places": [0.0, 1.5], "values": [0.3, 0.02]}),
@@ -300,11 +315,13 @@ ROWS = {
     "actuator.saturation": Row("drives", 10.0, cost),
     "actuator.dead_zone": Row("drives", 3.0, cost),
     "path.points": Row("path", [[0.0, 0.0], [1.0, 0.2], [2.0, 0.0]], motion),
-    "path.file": Row("path", "way.csv", "points or file"),
+    "path.file": Row("path", "way.csv", "points, file, segments or pieces"),
     "path.heading": Row("free", "along", 'none, or heading = "free"'),
     "path.headings": Row("free", [0.0, 0.3, 0.1], motion),
     "path.spacing": Row("path", "uniform", motion),
     "path.stops": Row("path", [0.7], motion),
+    "path.start": Row("segments", [0.0, 0.1, 0.1], motion),
+    "path.drive": Row("segments", "backward", motion),
     "path.start_heading": Row("ramp", -3.1, motion),
     "path.start_rate": Row("ramp", 1.0, motion),
     "path.goal_heading": Row("ramp", -3.1, motion),
@@ -328,6 +345,32 @@ ROWS = {
     "printed.fitted": Row("encounters", False, notes),
     "printed.residuals": Row("encounters", {"length": 0.1}, notes),
 }
+
+for where, base in (("path", "segments"), ("path.pieces", "pieces")):
+    inside = "path.pieces.1" if base == "pieces" else "path"
+    for part, key, new in (
+        ("straight", "length", 0.2), ("clothoid", "length", 0.2), ("clothoid", "start", 0.1),
+        ("clothoid", "end", 0.3), ("arc", "radius", 2.0), ("arc", "angle", -0.1),
+    ):  # fmt: skip
+        at = [one["kind"] for one in SEGMENTS].index(part)
+        row = Row(base, new, motion, f"{inside}.segments.{at}.{key}")
+        ROWS[f"{where}.segments.{part}.{key}"] = row
+        row = Row(base, "curl", "segments", f"{inside}.segments.{at}.kind")
+        ROWS[f"{where}.segments.{part}.kind"] = row
+for key, new, output in (
+    ("points", [[0.0, 0.0], [0.6, 0.2], [1.0, 0.1]], motion),
+    ("file", "way.csv", "points, file or segments"),
+    ("heading", "free", "one yaw a point"),
+    ("headings", [0.0, 0.0, 0.0], 'none, or heading = "free"'),
+    ("spacing", "uniform", motion),
+    ("start_heading", 0.1, motion),
+    ("start_rate", 0.5, motion),
+    ("goal_heading", 0.1, "faces"),
+    ("goal_rate", 0.5, motion),
+):
+    ROWS[f"path.pieces.{key}"] = Row("pieces", new, output, f"path.pieces.0.{key}")
+ROWS["path.pieces.start"] = Row("pieces", [1.0, 0.2, np.pi], "0.1 m away", "path.pieces.1.start")
+ROWS["path.pieces.drive"] = Row("pieces", "forward", "faces", "path.pieces.1.drive")
 
 
 def keys(model: type[BaseModel], before: str = "") -> Iterator[str]:
@@ -388,3 +431,35 @@ def test_points_of_a_file_are_the_points(tmp_path: Any) -> None:
     assert motion(solve(bases()["free"].replace(changes))) == motion(before("free"))
     with pytest.raises(ProblemError, match="columns x, y"):
         bases()["path"].replace({"path.points": None, "path.file": str(tmp_path / "none.csv")})
+
+
+def test_pieces_are_those_of_python(tmp_path: Any) -> None:
+    """The same motion; a piece goes on where the one before ends; files of pieces stand alone."""
+    first, second = PIECES
+    ahead = Curve.through(first["points"], start_direction=[1, 0], end_direction=[1, 0])
+    parts = [Straight(0.3), Clothoid(0.3, 0.0, 0.4), Arc(2.5, 0.1), Clothoid(0.3, 0.4, 0.0)]
+    back = Curve.segments(parts, start=second["start"]).backward()
+    whole = Curve.join([ahead, back])
+    problem = bases()["pieces"]
+    found = problem.flat_path
+    u = np.linspace(0.0, whole.end, 20)
+    np.testing.assert_array_equal(found.position(u), whole.position(u))
+    np.testing.assert_array_equal(found.yaw(u), whole.yaw(u))
+    goes_on = problem.replace({"path.pieces.1.start": None}).flat_path
+    np.testing.assert_allclose(goes_on.position(u), whole.position(u), atol=1e-12)
+    with pytest.raises(ProblemError, match=r"path.pieces\[0\].start"):
+        problem.replace({"path": {"pieces": [{"segments": SEGMENTS}]}})
+    with pytest.raises(ProblemError, match=r"path.pieces\[1\].*0.2 m away"):
+        problem.replace({"path.pieces.1.start": [1.2, 0.1, np.pi]})
+    with pytest.raises(ProblemError, match="none with segments"):
+        bases()["segments"].replace({"path.spacing": "uniform"})
+    with pytest.raises(ProblemError, match=r"path\.start.*none with points"):
+        bases()["path"].replace({"path.start": [0.0, 0.0, 0.0]})
+    with pytest.raises(ProblemError, match=r"path\.drive.*headings say"):
+        bases()["free"].replace({"path.drive": "backward"})
+    file = tmp_path / "way.csv"
+    file.write_text("x,y\n" + "\n".join(f"{x},{y}" for x, y in first["points"]))
+    named = problem.replace({"path.pieces.0.points": None, "path.pieces.0.file": str(file)})
+    tables = named.standalone()
+    assert tables["path"]["pieces"][0]["points"] == first["points"]
+    assert motion(solve(validated(Problem, tables, "alone.toml"))) == motion(before("pieces"))

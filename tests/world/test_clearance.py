@@ -10,7 +10,7 @@ import shapely
 from shapely import affinity
 
 from trajopt.paths.path import Path
-from trajopt.world.clearance import TOLERANCE, _travel, path_clearance
+from trajopt.world.clearance import TOLERANCE, path_clearance
 from trajopt.world.keep_out import KeepOut, outside_of, without_holes
 from trajopt.world.obstacles import Circle, Wall
 from trajopt.world.scene import Scene
@@ -88,11 +88,10 @@ def test_travel_of_a_point_is_bounded_and_the_bound_is_near(free: bool, reach: f
     rng = np.random.default_rng(3)
     points = np.column_stack([np.arange(6) * 1.5, rng.uniform(-1, 1, 6)])
     path = Path.through(points, heading=rng.uniform(-3, 3, 6) if free else None, turning_length=0.4)
-    knots, cubics = path.scaled_cubics
-    scale = path.turning_length if free else 0.0
+    knots = path.basis.knots
     for parts, most in ((1, np.inf), (8, 1.6), (64, 1.03)):
         u = np.unique(np.concatenate([np.linspace(*ends, parts + 1) for ends in pairwise(knots)]))
-        bound = _travel(knots, cubics, scale, u[:-1], u[1:], reach)
+        bound = path.swept(u[:-1], u[1:], reach)
         t = np.linspace(u[:-1], u[1:], 401, axis=1)
         place = path.position(t.ravel()).reshape(*t.shape, -1)[..., :2]
         yaw = np.unwrap(path.yaw(t.ravel())).reshape(t.shape)

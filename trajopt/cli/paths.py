@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trajopt.cli.shared import Overrides, console, overrides, simple_table
+from trajopt.cli.shared import Force, Overrides, console, overrides, require_free, simple_table
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -83,11 +83,13 @@ def export(
         typer.Option(help="of commands: mean (exact wheel angles) or held (as Waheed 2006)"),
     ] = None,
     set_: Overrides = None,
+    force: Force = False,
 ) -> None:
     """Write a motion for other programs; as CSV: t (s), v_<wheel> (m/s at the rim),
     steering_<wheel> (rad) where it steers, vx, vy, wz of the body."""
     from trajopt.formats import export as write
 
+    require_free("--out", out, force)
     told = write(_timed(plan, set_, "auto"), out, format_, sample_time=sample_time, rule=rule)
     console.print(f"wrote {told} to {out}", soft_wrap=True)
 

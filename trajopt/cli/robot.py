@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from trajopt.cli.shared import FAULTY, Overrides, console, overrides, simple_table
+from trajopt.cli.shared import (
+    FAULTY,
+    Force,
+    Overrides,
+    console,
+    overrides,
+    require_free,
+    simple_table,
+)
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -40,6 +48,7 @@ def robot(
         str | None,
         typer.Option("--wheels", help="of *.urdf and *.xml: the joints of the wheels, a,b,c"),
     ] = None,
+    force: Force = False,
 ) -> None:
     """What a robot is: wheels, mobility, checks, and a view from above; robots of other programs
     read and written."""
@@ -53,6 +62,7 @@ def robot(
             raise ArgumentError("robot", None, expected)
         _list([shipped(known) for known in robot_names()])
         return
+    require_free("--out", out, force)
     changes = overrides(set_)
     foreign = name.endswith((".urdf", ".xml"))
     if foreign != (wheels is not None):

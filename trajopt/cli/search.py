@@ -13,6 +13,7 @@ from trajopt.cli.shared import (
     INTERRUPTED,
     Bar,
     ControlOption,
+    Force,
     FormatOption,
     Overrides,
     ProblemFile,
@@ -20,6 +21,7 @@ from trajopt.cli.shared import (
     control_mode,
     overrides,
     picture_kind,
+    require_free,
 )
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
@@ -57,6 +59,7 @@ def solve(
     ] = False,
     pictures: Annotated[bool, typer.Option(help="draw pictures into the folder")] = True,
     format_: FormatOption = None,
+    force: Force = False,
 ) -> None:
     """Do the job of a problem (search, time a path, plan a climb), and write what was found."""
     from trajopt.optimize.base import Status
@@ -86,7 +89,7 @@ def solve(
     console.print(solution_table(solution))
     console.facts(solution_summary(solution, seed=seed))
     if out is not None:
-        _write(solution, out, seed, kind)
+        _write(solution, out, seed, kind, force)
     if not solution.holds:
         for fault in solution.faults:
             console.print(words(("does not hold:", "red"), f" {fault}"))
@@ -147,6 +150,7 @@ def schema(
     out: Annotated[
         Path | None, typer.Option(help="file to write; standard output without it")
     ] = None,
+    force: Force = False,
 ) -> None:
     """Print the JSON schema of problem, robot or sweep files, for editors."""
     from trajopt.problem import problem_schema
@@ -154,6 +158,7 @@ def schema(
     from trajopt.schema import json_schema
     from trajopt.sweeps.sweepfile import sweep_schema
 
+    require_free("--out", out, force)
     kinds = {
         "problem": problem_schema,
         "robot": lambda: json_schema(RobotDescription),
@@ -171,10 +176,11 @@ def schema(
             part.write_text(text, encoding="utf-8")
 
 
-def _write(solution: Solution, out: Path, seed: int, pictures: str | None) -> None:
+def _write(solution: Solution, out: Path, seed: int, pictures: str | None, force: bool) -> None:
     from trajopt.report.run_folder import write_solution
 
-    write_solution(solution, out, seed=seed, command=" ".join(sys.argv), pictures=pictures)
+    command = " ".join(sys.argv)
+    write_solution(solution, out, seed=seed, command=command, pictures=pictures, force=force)
     console.print(f"written to {out}", soft_wrap=True)
 
 

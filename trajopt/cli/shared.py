@@ -110,6 +110,7 @@ ControlOption = Annotated[
 FormatOption = Annotated[
     str | None, typer.Option("--format", help="of pictures: png (default), pdf or svg")
 ]
+Force = Annotated[bool, typer.Option("--force", help="write over a file that is there")]
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
@@ -118,6 +119,12 @@ Overrides = Annotated[
         show_default=False,
     ),
 ]
+
+
+def require_free(name: str, file: Path | None, force: bool) -> None:
+    """Raises ArgumentError where ``file`` is there and shall not be written over."""
+    if file is not None and file.exists() and not force:
+        raise ArgumentError(name, str(file), "a file that is not there yet, or --force")
 
 
 def picture_kind(pictures: bool, kind: str | None) -> str | None:

@@ -11,7 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from trajopt.cli.shared import FormatOption, console, leaving, picture_kind, switched
+from trajopt.cli.shared import (
+    Force,
+    FormatOption,
+    console,
+    leaving,
+    picture_kind,
+    require_free,
+    switched,
+)
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -288,11 +296,14 @@ def repair(store: StorePath) -> None:
 @app.command()
 @switched
 def export(
-    store: StorePath, out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")]
+    store: StorePath,
+    out: Annotated[Path, typer.Argument(help="file: *.csv, *.parquet or *.jsonl")],
+    force: Force = False,
 ) -> None:
     """Write all rows, one a case, to one file."""
     from trajopt.sweeps.store import open_store
 
+    require_free("out", out, force)
     place = open_store(store, create=False)
     if out.suffix not in (".csv", ".parquet", ".jsonl"):
         raise ArgumentError("out", str(out), "a file ending in .csv, .parquet or .jsonl")
@@ -323,10 +334,13 @@ def plot(
     pair: Annotated[
         list[str] | None, typer.Option("--pair", help="column of a picture of pairs; repeat")
     ] = None,
+    force: Force = False,
 ) -> None:
     """Draw a sweep: --x --y --value (heat map), --x --value [--by] (lines), or --pair twice or
     more."""
     from trajopt.report.sweeps import draw
+
+    require_free("out", out, force)
 
     draw(store, out, value=value, x=x, y=y, by=by, pair=pair)
     console.print(f"written to {out}", soft_wrap=True)

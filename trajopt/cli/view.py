@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from trajopt.cli.shared import console
+from trajopt.cli.shared import Force, console, require_free
 from trajopt.errors import ArgumentError
 
 
@@ -29,6 +29,7 @@ def view(
     ] = "whole",
     speed: Annotated[float, typer.Option(help="of a recording, over the motion's own")] = 1.0,
     size: Annotated[tuple[int, int], typer.Option(help="of a recording, pixels")] = (640, 400),
+    force: Force = False,
 ) -> None:
     """Write view.html, which shows a run or a sweep without network or server; open or record it."""
     import webbrowser
@@ -37,6 +38,8 @@ def view(
     from trajopt.report.viewer.motion_page import write_view
     from trajopt.report.viewer.record import record
 
+    require_free("--gif", gif, force)
+    require_free("--mp4", mp4, force)
     page = None
     if (folder / "store.json").exists():
         from trajopt.report.viewer.sweep_page import write_sweep_page

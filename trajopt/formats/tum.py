@@ -24,9 +24,13 @@ def write(trajectory: Trajectory, file: Path, sample_time: float) -> int:
     """Rows in steps of ``sample_time``, s, and at the end; returns how many. Raises ArgumentError
     for a motion that is not along its path on level ground."""
     path = trajectory.path
-    if path.heading is not None or not trajectory.ground.level:
-        value = "a hill" if path.heading is None else "a free heading"
-        expected = "a motion along its path on level ground: race lines have no other heading"
+    back = bool((path.facing(trajectory.u) < 0).any())
+    if path.heading is not None or back or not trajectory.ground.level:
+        other = "driven backward" if back else "a hill"
+        value = other if path.heading is None else "a free heading"
+        expected = (
+            "a motion forward along its path on level ground: race lines have no other heading"
+        )
         raise ArgumentError("--format tum", value, expected)
     s, v, _ = trajectory.along(sample_times(trajectory, sample_time))
     kept = np.append(True, np.diff(s) > _STILL)

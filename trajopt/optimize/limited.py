@@ -111,5 +111,5 @@ class Limited(Record):
         met = target is not None and self.best_cost <= target + _ROUNDING * abs(target)
         if met and self.best_violation <= FEASIBLE:
             self.stop(Status.TARGET)
-        if self._late() and not (before and self.nfev == 0):
+        if self._late() and not (before and self._kept == 0):  # one is always evaluated
             self._over(Status.SECONDS)

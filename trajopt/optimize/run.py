@@ -32,6 +32,7 @@ from trajopt.optimize.workers import Pool
 Progress = Callable[[int, float], None]  # called with evaluations used and the best cost
 Callback = Callable[[Array, float, float], Any]  # with the best x, its cost and violation
 
+_REPEATS = 1000  # times in a row that a method may ask for the same candidate, chosen
 _PORTION = 0.02  # s that one call of a batch may take near the deadline, chosen
 _APART = 1e-3  # of the width by which candidates differ that show how a function works, chosen
 _ENDED_FROM_OUTSIDE = (Status.INTERRUPTED, Status.CALLBACK)
@@ -54,6 +55,7 @@ class Run(Limited):
         self._single = Capability.BATCH not in self.objective.provides
         self._pace = math.inf  # s that one candidate takes, inf before the first
         self._point: tuple[Array, Evaluation] | None = None
+        self._repeats = 0
         self._derivatives = Derivatives(self)
 
     # -- evaluating
@@ -95,7 +97,11 @@ class Run(Limited):
         """Evaluation of one candidate (d,); a method that asks for the last one again pays once."""
         x = np.clip(x, self._low, self._high)  # undo rounding beyond the bounds
         if self._point is None or not np.array_equal(x, self._point[0]):
-            self._point = x.copy(), self.evaluate(x[None], inside=True)
+            self._point, self._repeats = (x.copy(), self.evaluate(x[None], inside=True)), 0
+        else:
+            self._repeats += 1
+            if self._repeats > _REPEATS:  # it would go on for ever, as repeats cost no budget
+                self._over(Status.STALLED)
         return self._point[1]
 
     def cost(self, candidate: Array) -> float:
@@ -116,7 +122,8 @@ class Run(Limited):
         return left if fits else max(1, min(left, int(_PORTION / max(self._pace, 1e-9))))
 
     def _evaluated(self, rows: Array, inside: bool) -> Evaluation:
-        began = self._now()
+        timed = self._until < math.inf
+        began = self._now() if timed else 0.0
         if self.pool is None:
             found = self._taken(rows, self._guarded(rows), inside)
         else:
@@ -130,7 +137,8 @@ class Run(Limited):
             if len(parts) < len(rows):
                 self._over(Status.SECONDS)
             found = joined(parts)
-        self._pace = (self._now() - began) / len(rows)
+        if timed:
+            self._pace = (self._now() - began) / len(rows)
         return found
 
     def _taken(self, rows: Array, found: Evaluation, inside: bool) -> Evaluation:
@@ -244,6 +252,9 @@ class Run(Limited):
                 status, said = stop.status, stop.said
             except KeyboardInterrupt:
                 status, said = Status.INTERRUPTED, ""
+            except BaseException:  # sys.exit, say: at least the state is kept
+                self.checkpoint(now=True)
+                raise
         seconds = self.elapsed
         self.checkpoint(now=True)
         x, fun, violation = self.judged()

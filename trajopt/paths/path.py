@@ -7,21 +7,24 @@ where it can turn on the spot (L = ``turning_length``), so that a pure turn has 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from trajopt import arrays
-from trajopt.arrays import Array, IndexArray, as_numbers, require_finite
+from trajopt.arrays import Array, IndexArray, require_finite
 from trajopt.errors import ArgumentError
-from trajopt.paths.points import default_knots, finite_numbers, lap
+from trajopt.paths.points import finite_numbers, interpolated
 from trajopt.paths.spline import SplineBasis
 
-_SETTLED = 1e-14  # of the length: what halving a quadrature cell may change; chosen
-_HALVINGS = 60  # of a quadrature cell at most: down to rounding
-_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(8)
+if TYPE_CHECKING:
+    from trajopt.paths.segments import Segment
+
+SETTLED = 1e-14  # of the length: what halving a quadrature cell may change; chosen
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,9 @@ class Path:
     coordinates: Array
     heading: Array | None = None
     turning_length: float = 1.0
+
+    plain: ClassVar[bool] = True  # whether the path is its spline
+    orders: ClassVar[int] = 3  # of the highest derivative that is not 0 everywhere
 
     def __post_init__(self) -> None:
         if not isinstance(self.basis, SplineBasis):
@@ -83,34 +89,62 @@ class Path:
         numbers that are not finite.
         """
         arrays.require_flag("closed", closed)
-        array = finite_numbers("points", points, "shape (N, 2) or (N, 3) with N >= 2")
-        if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] not in (2, 3):
-            raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
-        yaw = None
-        if heading is not None:
-            expected = f"one angle a point, shape ({len(array)},)"
-            yaw = finite_numbers("heading", heading, expected, (len(array),))
-        if closed:
-            array, yaw = lap(array, yaw)
-        given = (
-            default_knots(array, yaw, turning_length)
-            if knots is None
-            else tuple(as_numbers("knots", knots, "increasing numbers").ravel().tolist())
+        ends = {"start_direction": start_direction, "end_direction": end_direction}
+        return cls(
+            *interpolated(points, heading, knots, ends, turning_length, closed), turning_length
         )
-        if len(given) != len(array):
-            raise ArgumentError("knots", len(given), f"one knot a point ({len(array)})")
-        both = (start_direction is not None, end_direction is not None)
-        basis = SplineBasis(given, *both, closed=bool(closed))
-        ends = []
-        for name, end in (("start_direction", start_direction), ("end_direction", end_direction)):
-            if end is not None:
-                dimensions = array.shape[1:]
-                ends.append(finite_numbers(name, end, f"{dimensions[0]} numbers", dimensions))
-        coordinates = np.vstack([array, *ends]) if ends else array
-        if yaw is not None and ends:  # ends turn at the mean rate, if clamped
-            span = (yaw[-1] - yaw[0]) / (given[-1] - given[0])
-            yaw = np.concatenate([yaw, np.full(len(ends), span)])
-        return cls(basis, coordinates, yaw, turning_length)
+
+    @staticmethod
+    def segments(segments: Sequence[Segment], *, start: ArrayLike) -> Path:
+        """Straight lines, arcs and clothoids one after the other from ``start``: x, y (m) and
+        direction of travel (rad). Exact: no spline is laid through anything.
+
+        Where curvature jumps ``time_scale`` asks for a stop, or for a clothoid, if a limit would be
+        broken, or wheels are steered. Raises ArgumentError.
+
+        >>> from trajopt import Arc, Straight
+        >>> Path.segments([Straight(2.0), Arc(1.0, np.pi / 2)], start=(0, 0, 0)).length - np.pi / 2
+        2.0
+        """
+        from trajopt.paths.segments import segment_path
+
+        return segment_path(segments, start)
+
+    @staticmethod
+    def join(pieces: Sequence[Path]) -> Path:
+        """One path of several pieces; the robot rests where they meet, and may turn back there.
+
+        Raises ArgumentError, with place and distance, where a piece does not begin where the one
+        before ends, with the robot facing the same way.
+
+        >>> ahead = Path.through([[0, 0], [1, 0]])
+        >>> back = Path.through([[1, 0], [0, 0]]).backward()
+        >>> Path.join([ahead, back]).yaw([0.0, 2.0]).tolist()
+        [0.0, 0.0]
+        """
+        from trajopt.paths.joined import joined
+
+        return joined(pieces)
+
+    def backward(self) -> Path:
+        """The same path driven backward: the robot faces against the direction of travel."""
+        from trajopt.paths.joined import backward
+
+        return backward(self)
+
+    @property
+    def joints(self) -> Array:
+        """(J,): spline parameters where pieces meet and the robot rests."""
+        return np.zeros(0)
+
+    @property
+    def jumps(self) -> Array:
+        """(J,): spline parameters where the curvature jumps, other than at ``joints``."""
+        return np.zeros(0)
+
+    def facing(self, u: ArrayLike) -> Array:
+        """(N,): 1 where the robot drives forward, -1 where backward; at a joint as after it."""
+        return np.ones(len(row("u", u)))
 
     @property
     def closed(self) -> bool:
@@ -149,6 +183,8 @@ class Path:
             return self._evaluate(u, derivative)[:, -1]
         d = self.position(u, 1)
         if derivative == 0:
+            if not self.plain:
+                d = d * self.facing(u)[:, None]
             return np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
         if derivative != 1:
             raise ArgumentError(
@@ -164,26 +200,31 @@ class Path:
         values = self.coordinates
         if self.heading is not None:
             values = np.column_stack([values, self.heading])
-        knots = np.asarray(self.basis.knots, dtype=np.float64)
-        y, m, h = (
-            values[: len(knots)],
-            self.basis.bends(values),
-            np.diff(knots)[:, None],
-        )
+        knots = self._knots
+        y, m, h = values[: len(knots)], self.basis.bends(values), np.diff(knots)[:, None]
         first = np.diff(y, axis=0) / h - h * (2 * m[:-1] + m[1:]) / 6
         return knots, np.stack([y[:-1], first, m[:-1] / 2, np.diff(m, axis=0) / (6 * h)], axis=1)
 
     def _evaluate(self, u: ArrayLike, derivative: int) -> Array:
-        """(N, D): derivative 0..3 at u, segment by segment; at a knot, of the segment to the right.
+        """(N, D): derivative at u; at a knot, of the segment to the right. As ``basis.matrix(u,
+        derivative) @ values``, in a tenth of the time for many points."""
+        most = self.orders
+        arrays.require_whole("derivative", derivative, 0, f"an order from 0 to {most}", most)
+        return self._inside(*self._placed(row("u", u)), derivative)
 
-        The same function as ``basis.matrix(u, derivative) @ values``, in a tenth of the time for
-        many points.
-        """
-        arrays.require_whole("derivative", derivative, 0, "an order from 0 to 3", 3)
-        knots, cubics = self._cubics
-        u = _row("u", u)
-        i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(cubics) - 1)
-        t, c = (u - knots[i])[:, None], cubics[i]
+    def _placed(self, u: Array) -> tuple[IndexArray, Array]:
+        """(N,) each: in which cell between knots, and how far after its knot."""
+        knots = self._knots
+        i = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
+        return i, u - knots[i]
+
+    @cached_property
+    def _knots(self) -> Array:
+        return np.asarray(self.basis.knots, dtype=np.float64)
+
+    def _inside(self, i: IndexArray, t: Array, derivative: int) -> Array:
+        """(N, D): derivative so far after the knots that cells i begin with."""
+        c, t = self._cubics[1][i], t[:, None]
         if derivative == 0:
             return np.asarray(c[:, 0] + t * (c[:, 1] + t * (c[:, 2] + t * c[:, 3])))
         if derivative == 1:
@@ -207,14 +248,9 @@ class Path:
             scale[-1] = self.turning_length
         return knots, np.ascontiguousarray(cubics * scale)
 
-    @property
-    def plain(self) -> bool:
-        """Whether the path is its spline; otherwise it follows a surface."""
-        return type(self).position is Path.position
-
     def standstill(self, share: float) -> float | None:
-        """Spline parameter u where ds/du is below ``share`` of its mean, where the path stands
-        still or doubles back; None where there is no such place.
+        """Spline parameter u where ds/du is below ``share`` of its mean: the path stands still or
+        doubles back; None without such a place.
 
         Exact: on a segment (ds/du)^2 is a quartic, least at an end or at a root of its derivative.
         """
@@ -223,49 +259,29 @@ class Path:
         u, least = arc.slowest(*self.scaled_cubics)
         return float(u) if least < share * self.length / (self.end - self.start) else None
 
+    def swept(self, left: Array, right: Array, reach: float) -> Array:
+        """(N,): at least the way (m) in the plane of any point within ``reach`` (m) of the origin
+        between spline parameters left and right, no knot between them."""
+        i, t = self._placed(left)
+        return self._swept(i, t, right - left, reach)
+
+    def _swept(self, i: IndexArray, t: Array, h: Array, reach: float) -> Array:
+        from trajopt.paths.swept import swept
+
+        scale = self.turning_length if self.heading is not None else 0.0
+        return swept(self.scaled_cubics[1][i], t, h, scale, reach)
+
     @cached_property
     def _cells(self) -> tuple[Array, Array, IndexArray]:
         from trajopt.paths import arc
 
-        return arc.measure(*self.scaled_cubics, _SETTLED)
+        return arc.measure(*self.scaled_cubics, SETTLED)
 
     @cached_property
     def _table(self) -> tuple[Array, Array]:
-        """Spline parameters of the quadrature cells and the path parameter there. Cells are halved
-        until that changes nothing: ds/du has branch points near sharp bends."""
-        if self.plain:
-            cells, s, _ = self._cells
-            return np.append(cells, self.end), s
-        left, right = np.asarray(self.basis.knots[:-1]), np.asarray(self.basis.knots[1:])
-        whole = self._integrate(left, right)
-        starts, lengths, scale = list[Array](), list[Array](), 0.0
-        for done in range(_HALVINGS):
-            middle = (left + right) / 2
-            first, second = self._integrate(left, middle), self._integrate(middle, right)
-            scale = scale or float(np.sum(first + second))
-            off = np.abs(first + second - whole) > _SETTLED * scale
-            off &= (middle > left) & (middle < right)
-            if done == _HALVINGS - 1:
-                off[:] = False
-            starts += [left[~off], middle[~off]]
-            lengths += [first[~off], second[~off]]
-            if not off.any():
-                break
-            left, right = (
-                np.concatenate([left[off], middle[off]]),
-                np.concatenate([middle[off], right[off]]),
-            )
-            whole = np.concatenate([first[off], second[off]])
-        u, gained = np.concatenate(starts), np.concatenate(lengths)
-        order = np.argsort(u)
-        s = np.concatenate([[0.0], np.cumsum(gained[order])])
-        return np.append(u[order], self.end), s
-
-    def _integrate(self, a: Array, b: Array) -> Array:
-        """Path parameter gained from a to b (each inside one quadrature cell)."""
-        half = (b - a) / 2
-        nodes = (a + b)[:, None] / 2 + half[:, None] * _GAUSS_X
-        return np.asarray((self.rate(nodes.ravel()).reshape(nodes.shape) @ _GAUSS_W) * half)
+        """Spline parameters of the quadrature cells, and the path parameter there."""
+        cells, s, _ = self._cells
+        return np.append(cells, self.end), s
 
     @property
     def length(self) -> float:
@@ -279,40 +295,22 @@ class Path:
 
     def parameter(self, u: ArrayLike) -> Array:
         """(N,): path parameter s at spline parameters u."""
-        u = _row("u", u)
-        if self.plain:
-            from trajopt.paths import arc
+        from trajopt.paths import arc
 
-            (knots, cubics), (cells, s, segment) = self.scaled_cubics, self._cells
-            return arc.parameters(knots, cubics, cells, s, segment, u)
-        grid, s = self._table
-        i = np.clip(np.searchsorted(grid, u, side="right") - 1, 0, len(grid) - 2)
-        return np.asarray(s[i] + self._integrate(grid[i], u))
+        (knots, cubics), (cells, s, segment) = self.scaled_cubics, self._cells
+        return arc.parameters(knots, cubics, cells, s, segment, row("u", u))
 
     def locate(self, s: ArrayLike) -> Array:
         """(N,): spline parameter u at path parameters s in [0, length]: inverse cubic, then Newton
         on the arc length."""
-        grid, table = self._table
-        s = np.clip(_row("s", s), 0.0, self.length)
-        if self.plain:
-            from trajopt.paths import arc
+        from trajopt.paths import arc
 
-            (knots, cubics), (cells, table, segment) = self.scaled_cubics, self._cells
-            return arc.places(knots, cubics, cells, table, segment, s)
-        i = np.clip(np.searchsorted(table, s, side="right") - 1, 0, len(grid) - 2)
-        left, right, width = grid[i], grid[i + 1], table[i + 1] - table[i]
-        share = (s - table[i]) / np.where(width > 0, width, 1.0)
-        u = left + (right - left) * share
-        for _ in range(8):
-            residual = table[i] + self._integrate(left, u) - s
-            rate = self.rate(u)
-            u = np.clip(u - residual / np.where(rate > 0, rate, np.inf), left, right)
-            if np.all(np.abs(residual) <= 1e-11 * width):  # the step just taken squares it
-                break
-        return np.asarray(u)
+        (knots, cubics), (cells, table, segment) = self.scaled_cubics, self._cells
+        s = np.clip(row("s", s), 0.0, self.length)
+        return arc.places(knots, cubics, cells, table, segment, s)
 
 
-def _row(name: str, values: ArrayLike) -> Array:
+def row(name: str, values: ArrayLike) -> Array:
     """Finite numbers (N,), of one number too. Raises ArgumentError."""
     array = np.atleast_1d(require_finite(name, values, "(N,)", None))
     if array.ndim > 1:

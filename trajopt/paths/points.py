@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, Shape, as_numbers
 from trajopt.errors import ArgumentError
-from trajopt.paths.spline import chord_length_knots
+from trajopt.paths.spline import SplineBasis, chord_length_knots
 
 _LARGEST = 1e7  # m (and rad): farther than any robot drives; squares of it keep nine digits of a metre. Chosen
 
@@ -41,3 +43,44 @@ def lap(points: Array, yaw: Array | None) -> tuple[Array, Array | None]:
         turns = np.round((yaw[-1] - yaw[0]) / (2 * np.pi))
         yaw = np.append(yaw, yaw[0] + 2 * np.pi * turns)
     return np.vstack([points, points[:1]]), yaw
+
+
+def interpolated(
+    points: ArrayLike,
+    heading: ArrayLike | None,
+    knots: ArrayLike | None,
+    ends: Mapping[str, ArrayLike | None],
+    turning_length: float,
+    closed: bool,
+) -> tuple[SplineBasis, Array, Array | None]:
+    """Basis and control values of ``Path.through``, coordinates and headings; ``ends``: directions at
+    start and end, by the name of their argument."""
+    array = finite_numbers("points", points, "shape (N, 2) or (N, 3) with N >= 2")
+    if array.ndim != 2 or array.shape[0] < 2 or array.shape[1] not in (2, 3):
+        raise ArgumentError("points", array.shape, "shape (N, 2) or (N, 3) with N >= 2")
+    yaw = None
+    if heading is not None:
+        expected = f"one angle a point, shape ({len(array)},)"
+        yaw = finite_numbers("heading", heading, expected, (len(array),))
+    if closed:
+        array, yaw = lap(array, yaw)
+    given = (
+        default_knots(array, yaw, turning_length)
+        if knots is None
+        else tuple(as_numbers("knots", knots, "increasing numbers").ravel().tolist())
+    )
+    if len(given) != len(array):
+        raise ArgumentError("knots", len(given), f"one knot a point ({len(array)})")
+    first, last = (end is not None for end in ends.values())
+    basis = SplineBasis(given, first, last, bool(closed))
+    dimensions = array.shape[1:]
+    rates = [
+        finite_numbers(name, end, f"{dimensions[0]} numbers", dimensions)
+        for name, end in ends.items()
+        if end is not None
+    ]
+    coordinates = np.vstack([array, *rates]) if rates else array
+    if yaw is not None and rates:  # ends turn at the mean rate, if clamped
+        span = (yaw[-1] - yaw[0]) / (given[-1] - given[0])
+        yaw = np.concatenate([yaw, np.full(len(rates), span)])
+    return basis, coordinates, yaw

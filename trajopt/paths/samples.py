@@ -17,7 +17,7 @@ as the ground, its lateral axis level.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -99,7 +99,8 @@ def sample_at(path: Path, s: Array, u: Array) -> PathSamples:
     """
     p = [path.position(u, k) for k in range(4)]
     if path.heading is None:
-        return along_tangent(s, u, p)
+        found = along_tangent(s, u, p)
+        return found if path.plain else _facing(found, path.facing(u))
     yaw = [path.yaw(u, k) for k in range(4)]
     return _free_heading(s, u, p, yaw, path.turning_length)
 
@@ -160,6 +161,25 @@ def along_tangent(s: Array, u: Array, p: list[Array]) -> PathSamples:
         np.column_stack([one, zero, zero]),
         turning,
         turning_rate,
+    )
+
+
+def _facing(found: PathSamples, sign: Array) -> PathSamples:
+    """Samples of a robot that faces against the direction of travel where ``sign`` (N,) is -1: the
+    axes ahead and to the left change theirs."""
+    if (sign > 0).all():
+        return found
+    both = np.column_stack([sign, sign, np.ones(len(sign))])
+    return replace(
+        found,
+        yaw=np.unwrap(found.yaw + np.where(sign < 0, np.pi, 0.0)),
+        twist=found.twist * both,
+        twist_rate=found.twist_rate * both,
+        acceleration_rate=found.acceleration_rate * both,
+        gravity=found.gravity * both,
+        velocity=found.velocity * both,
+        turning=found.turning * both,
+        turning_rate=found.turning_rate * both,
     )
 
 

@@ -169,7 +169,7 @@ def _path(problem: Problem) -> None:
         expected = "none with [profile]: a speed of 0 there is a stop"
         raise broken_rule("path.stops", list(problem.path_section.stops), expected)
     steers = all(wheel.kind != "fixed" for wheel in problem.robot.rolling)
-    if problem.path_section.heading == "free" and not (problem.robot.holonomic or steers):
+    if problem.path_section.free and not (problem.robot.holonomic or steers):
         expected = f"\"along\": '{problem.robot.name}' cannot move in every direction"
         raise broken_rule("path.heading", "free", expected)
     try:

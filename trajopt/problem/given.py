@@ -1,11 +1,11 @@
-"""A given path, and a speed profile to follow along it."""
+"""A given path, of one piece or several, and a speed profile to follow along it."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from pathlib import Path as FilePath
-from typing import Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -16,17 +16,71 @@ from trajopt.files import read_table
 from trajopt.limits.speed_bound import SpeedProfile
 from trajopt.paths.path import Path
 from trajopt.paths.race_line import read_race_line
-from trajopt.schema import NonNegative, Point, Positive, Section, broken_rule
+from trajopt.paths.segments import Arc, Clothoid, Segment, Straight
+from trajopt.schema import NonNegative, Point, Point3, Positive, Section, broken_rule
 
 
-class PathSection(Section):
-    """A cubic spline through points, given here or in a CSV file."""
+class StraightSection(Section):
+    """A straight line."""
+
+    kind: Literal["straight"]
+    length: Positive = Field(description="m")
+
+    @property
+    def segment(self) -> Segment:
+        return Straight(self.length)
+
+
+class ArcSection(Section):
+    """An arc of a circle."""
+
+    kind: Literal["arc"]
+    radius: Positive = Field(description="m")
+    angle: float = Field(description="by which it turns, rad, positive to the left; not 0")
+
+    @property
+    def segment(self) -> Segment:
+        return Arc(self.radius, self.angle)
+
+
+class ClothoidSection(Section):
+    """Curvature that goes evenly from one value to another."""
+
+    kind: Literal["clothoid"]
+    length: Positive = Field(description="m")
+    start: float = Field(description="curvature at its start, 1/m, positive to the left")
+    end: float = Field(description="curvature at its end, 1/m")
+
+    @property
+    def segment(self) -> Segment:
+        return Clothoid(self.length, self.start, self.end)
+
+
+SegmentSection = Annotated[
+    StraightSection | ArcSection | ClothoidSection, Field(discriminator="kind")
+]
+
+
+class PieceSection(Section):
+    """A cubic spline through points, given here or in a CSV file; or straight lines, arcs and
+    clothoids."""
 
     points: tuple[Point, ...] | None = Field(None, description="x, y, m", min_length=2)
     file: str | None = Field(
         None,
         description="CSV with columns x, y (m), and yaw (rad) where the heading is free; or a race "
         "line of the TUM's planner (s_m; x_m; ...), of which points and heading are taken",
+    )
+    segments: tuple[SegmentSection, ...] | None = Field(
+        None, description="one after the other from start", min_length=1
+    )
+    start: Point3 | None = Field(
+        None,
+        description="x, y (m) and direction of travel (rad) where segments begin; in a piece absent: "
+        "where the piece before ends",
+    )
+    drive: Literal["forward", "backward"] = Field(
+        "forward", description="backward: the robot faces against the direction of travel"
     )
     heading: Literal["along", "free"] = Field(
         "along", description="along: the direction of travel; free: as headings say"
@@ -46,30 +100,30 @@ class PathSection(Section):
     goal_heading: float | None = Field(None, description="the same at the last point, rad")
     goal_rate: Positive | None = Field(None, description="the same at the last point, m a unit")
 
-    stops: tuple[Positive, ...] = Field(
-        (),
-        description="path parameters, m, increasing, where the robot comes to rest on the way; "
-        "steered wheels may turn there",
-    )
+    _one_of: ClassVar[tuple[str, ...]] = ("points", "file", "segments")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        if any(b <= a for a, b in itertools.pairwise(self.stops)):
-            raise broken_rule("stops", list(self.stops), "increasing path parameters, m")
-        if (self.points is None) == (self.file is None):
-            raise broken_rule("points", self.points, "points or file, one of them")
+        given = [key for key in self._one_of if getattr(self, key) is not None]
+        if len(given) != 1:
+            key = given[1] if given else "points"
+            expected = f"{', '.join(self._one_of[:-1])} or {self._one_of[-1]}, one of them"
+            raise broken_rule(key, "given" if given else None, expected)
+        self._refuse_unused(given[0])
         for end in ("start", "goal"):
             if (getattr(self, f"{end}_heading") is None) != (getattr(self, f"{end}_rate") is None):
                 value = getattr(self, f"{end}_rate")
                 expected = f"{end}_heading and {end}_rate both given or both left out"
                 raise broken_rule(f"{end}_rate", value, expected)
-        given = self.headings is not None
-        if given and self.heading == "along":
-            raise broken_rule("headings", list(self.headings or ()), 'none, or heading = "free"')
-        if self.points is None and given:
-            raise broken_rule("headings", list(self.headings or ()), "none: the file has a yaw")
+        if self.heading == "free" and self.drive == "backward":
+            expected = '"forward" with heading = "free": headings say which way the robot faces'
+            raise broken_rule("drive", self.drive, expected)
+        if self.headings is not None and self.heading == "along":
+            raise broken_rule("headings", list(self.headings), 'none, or heading = "free"')
+        if self.points is None and self.headings is not None:
+            raise broken_rule("headings", list(self.headings), "none: the file has a yaw")
         if self.points is not None:
-            if self.heading == "free" and not given:
+            if self.heading == "free" and self.headings is None:
                 raise broken_rule("headings", None, "one yaw a point, as heading is free")
             _require_apart("points", self.points)
             if self.headings is not None and len(self.headings) != len(self.points):
@@ -77,12 +131,41 @@ class PathSection(Section):
                 raise broken_rule("headings", list(self.headings), expected)
         return self
 
-    def path(self, folder: FilePath, turning_length: float) -> Path:
-        """The path in the plane; a file is looked for in ``folder``."""
+    def _refuse_unused(self, by: str) -> None:
+        """Keys that act only on another kind of path than ``by``."""
+        uses = {"segments": {"segments", "start", "drive"}, "pieces": {"pieces", "stops"}}
+        for key, info in type(self).model_fields.items():
+            used = key in uses[by] if by in uses else key not in ("start", "segments", "pieces")
+            if not (used or key == "stops") and getattr(self, key) != info.default:
+                raise broken_rule(key, getattr(self, key), f"none with {by}")
+
+    def path(self, folder: FilePath, turning_length: float, before: Path | None = None) -> Path:
+        """The path in the plane; a file is looked for in ``folder``. ``before``: the piece that ends
+        where this one begins. Raises ArgumentError."""
+        found = self._curve(folder, turning_length, before)
+        return found.backward() if self.drive == "backward" else found
+
+    def _curve(self, folder: FilePath, turning_length: float, before: Path | None) -> Path:
+        if self.segments is not None:
+            start = self.start
+            if start is None:
+                if before is None:
+                    raise ArgumentError("start", None, "x, y, direction of travel")
+                x, y, _ = before.position([before.end])[0].tolist()
+                turn = math.pi if self.drive == "backward" else 0.0
+                start = x, y, float(before.yaw([before.end])[0]) + turn
+            segments = []
+            for n, section in enumerate(self.segments):
+                try:
+                    segments.append(section.segment)
+                except ArgumentError as error:
+                    key = f"segments[{n}].{error.argument}"
+                    raise ArgumentError(key, error.value, error.expected) from None
+            return Path.segments(segments, start=start)
         points, headings = self.points, self.headings
         if self.file is not None:
             points, headings = read_points(folder / self.file, self.heading == "free")
-        assert points is not None  # one of both is given
+        assert points is not None  # one of them is given
         count = len(points)
         return Path.through(
             points,
@@ -92,6 +175,46 @@ class PathSection(Section):
             end_direction=_direction(self.goal_heading, self.goal_rate),
             turning_length=turning_length,
         )
+
+
+class PathSection(PieceSection):
+    """A path: one piece, or several with a stop where they meet."""
+
+    pieces: tuple[PieceSection, ...] | None = Field(
+        None,
+        description="one after the other; the robot rests where they meet, and may turn back there",
+        min_length=1,
+    )
+    stops: tuple[Positive, ...] = Field(
+        (),
+        description="path parameters, m, increasing, where the robot comes to rest on the way; "
+        "steered wheels may turn there",
+    )
+
+    _one_of: ClassVar[tuple[str, ...]] = ("points", "file", "segments", "pieces")
+
+    @model_validator(mode="after")
+    def _rising(self) -> Self:
+        if any(b <= a for a, b in itertools.pairwise(self.stops)):
+            raise broken_rule("stops", list(self.stops), "increasing path parameters, m")
+        return self
+
+    @property
+    def free(self) -> bool:
+        """Whether a heading of its own is given anywhere."""
+        return "free" in (part.heading for part in (self, *(self.pieces or ())))
+
+    def path(self, folder: FilePath, turning_length: float, before: Path | None = None) -> Path:
+        if self.pieces is None:
+            return super().path(folder, turning_length, before)
+        found = list[Path]()
+        for n, piece in enumerate(self.pieces):
+            try:
+                found.append(piece.path(folder, turning_length, found[-1] if found else None))
+            except ArgumentError as error:
+                key = f"pieces[{n}].{error.argument}"
+                raise ArgumentError(key, error.value, error.expected) from None
+        return Path.join(found)
 
 
 def read_points(
@@ -162,8 +285,8 @@ class ProfileSection(Section):
         return SpeedProfile(self.places, self.speeds)
 
 
-def inlined(path: PathSection, folder: FilePath) -> dict[str, Any]:
-    """Tables of the section with what its file holds, so that they stand alone."""
+def inlined(path: PieceSection, folder: FilePath) -> dict[str, Any]:
+    """Tables of the section with what its files hold, so that they stand alone."""
     tables = path.model_dump(mode="json", exclude_none=True)
     if path.file is not None:
         points, headings = read_points(folder / path.file, path.heading == "free")
@@ -171,4 +294,6 @@ def inlined(path: PathSection, folder: FilePath) -> dict[str, Any]:
         tables["points"] = [list(p) for p in points]
         if headings is not None:
             tables["headings"] = list(headings)
+    if isinstance(path, PathSection) and path.pieces is not None:
+        tables["pieces"] = [inlined(piece, folder) for piece in path.pieces]
     return tables

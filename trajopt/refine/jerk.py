@@ -32,10 +32,10 @@ _STARTS = (
     1.0,
     1.3,
 )  # times the stretched time-optimal motion: the program has several optima; chosen
-_ATTEMPTS = ((False, 2), (True, 3))
+_ATTEMPTS = ((False, 1), (True, 3))
 _PARTS = 3  # an interval is split into; chosen
 _SPLIT_ABOVE = 1e-3  # relative violation that splits an interval, or puts a row in; chosen
-_NEAR = 0.4  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
+_NEAR = 0.75  # share of a row's limit that the time-optimal motion uses somewhere, from which it is put in; chosen
 
 
 def limit_jerk(
@@ -69,6 +69,9 @@ def limit_jerk(
     if trajectory.rests:
         expected = "a motion whose wheels need not turn at rest on the way"
         raise ArgumentError("trajectory", [rest.s for rest in trajectory.rests], expected)
+    halts = trajectory.s[1:-1][trajectory.sd[1:-1] == 0]
+    if len(halts):
+        raise ArgumentError("trajectory", halts.tolist(), "a motion that does not stop on the way")
     used = trajectory.limits if limits is None else limits
     source = replace(trajectory, limits=used)
     found: list[SmoothMotion] = []

@@ -70,8 +70,9 @@ def corridor(path: Path) -> Builder:
     Raises ArgumentError for a path with a heading of its own or without inner knots.
     """
     knots = np.asarray(path.basis.knots)
-    if path.heading is not None or len(knots) < 3:
-        raise ArgumentError("path", len(knots), "a path along its heading with inner knots")
+    if path.heading is not None or len(knots) < 3 or not path.plain:
+        expected = "one spline along its heading, with inner knots"
+        raise ArgumentError("path", f"{len(knots)} knots", expected)
     d = path.position(knots[1:-1], 1)[:, :2]
     normal = np.column_stack([-d[:, 1], d[:, 0]]) / np.hypot(d[:, 0], d[:, 1])[:, None]
 

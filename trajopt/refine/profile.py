@@ -94,6 +94,9 @@ def follow(
         start_wheels=start_wheels,
         start_steering=start_steering,
     )
+    if manner == "least_squares" and len(below.path.joints):
+        expected = "below, on a path of several pieces: least squares does not stop between them"
+        raise ArgumentError("manner", manner, expected)
     if manner == "below":
         return Followed(below, np.interp(below.s, profile.places, profile.speeds))
     return _least_squares(profile, tuple(limits), below)

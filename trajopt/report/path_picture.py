@@ -68,7 +68,7 @@ def path_figure(solution: Solution, path: Path) -> Figure:
     draw_robot(axes, robot, goal, VERMILION, strong=True, label="goal", zorder=2.4)
     axes.plot(poses[:, 0], poses[:, 1], color=BLUE, linewidth=2.0, zorder=2.6, label="path")
     _draw_crossings(axes, solution, path)
-    if problem.job.name != "route":
+    if problem.job.name != "route" and len(solution.control_points):
         _draw_control_points(axes, solution)
     frame_points(axes, seen)
     axes.set_title(_title(solution))

@@ -98,6 +98,7 @@ def write_solution(
     seed: int,
     command: str | None = None,
     pictures: str | None = None,
+    force: bool = False,
 ) -> FilePath:
     """Write a solution into ``folder`` (made if needed; an earlier run's files are replaced) and
     return it.
@@ -106,13 +107,16 @@ def write_solution(
     (but pictures) and of itself. Equal seeds and budgets in evaluations give equal bytes there
     outside the keys "run" and "checksum". Without a trajectory there is no trajectory.csv and
     timing.csv. ``pictures`` is the format in which they are drawn too. Raises ArgumentError where the folder cannot be
-    written, or holds files of these names that no run wrote.
+    written, or, without ``force``, holds files of these names that no run
+    wrote.
     """
     place, search, problem = made_folder(folder), solution.search, solution.problem
     strange = [name for name in _OF_A_SOLUTION if (place / name).exists()]
     strange += _copies(place)
-    if strange and "summary.json" not in strange:
-        expected = f"a folder without {', '.join(strange)}: no run that ended wrote this"
+    if strange and "summary.json" not in strange and not force:
+        expected = (
+            f"a folder without {', '.join(strange)}: no run that ended wrote this; or --force"
+        )
         raise ArgumentError("folder", str(folder), expected)
     # Read first: the problem's file may stand in this folder itself.
     names: dict[str, str] = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 import time
 from collections.abc import Iterator, Sequence
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from trajopt.arrays import Array
 from trajopt.control.measured import Controller, Targets
 from trajopt.errors import ArgumentError, SimulationError
+from trajopt.provenance import versions
 from trajopt.robots.robot import Robot
 from trajopt.simulate.build import build
 from trajopt.simulate.engine import (
@@ -171,7 +171,7 @@ def drive(
         times, rows, reason = _driven(session, command, chosen, controller, sense)
         wall = time.perf_counter() - begun
         image, no_picture = _drawn(session, picture)
-    label = (chosen.name, importlib.metadata.version(chosen.name))
+    label = (chosen.name, versions([chosen.name]).get(chosen.name, ""))  # "": a user's own engine
     recording = _assembled(label, np.array(times), rows, reason, wall)
     return replace(recording, picture=image, no_picture=no_picture)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +12,10 @@ from trajopt.arrays import Array, as_numbers, require_not_negative
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.limits.limit import Limit, is_linear
 from trajopt.paths.path import Path
-from trajopt.paths.samples import require_moving
+from trajopt.paths.samples import PathSamples, require_moving
 from trajopt.robots.robot import Robot
 from trajopt.timing.engines import is_second_order, require_engine
+from trajopt.timing.rests import AT
 from trajopt.timing.track import Track, track
 from trajopt.world.ground import Ground
 
@@ -126,11 +127,58 @@ def checked_job(
     places = np.atleast_1d(as_numbers("stops", stops, expected))
     if places.ndim != 1 or not np.all((places > 0) & (places < path.length)):
         raise ArgumentError("stops", stops, expected)
+    places = _with_joints(path, places)
     if engine == "linear" and (any(speeds) or len(places)):
         raise ArgumentError(
             "start_speed, end_speed, stops",
             (*speeds, *places),
-            "0 and none: linear scaling takes the path's own speeds",
+            "0 and none, and a path of one piece: linear scaling takes the path's own speeds",
         )
     wheels = as_numbers("start_wheels", start[0], "wheel angles, rad")
+    _require_steady(along, limits, places)
     return Job(along, tuple(limits), *speeds, places, engine, wheels)
+
+
+def _with_joints(path: Path, stops: Array) -> Array:
+    """Path parameters (m) of stops that are given, and of those where pieces of the path meet."""
+    joints = path.parameter(path.joints)
+    apart = np.abs(stops[:, None] - joints).min(axis=1, initial=np.inf) > AT * path.length
+    return np.sort(np.concatenate([stops[apart], joints]))
+
+
+def _require_steady(along: Track, limits: Sequence[Limit], stops: Array) -> None:
+    """Raises InfeasibleError where the path's curvature jumps, the robot does not stop, and it
+    steers or a limit bounds what the jump makes infinite: any whose rows depend on how fast the
+    twist changes."""
+    path, u = along.path, along.path.jumps
+    s = path.parameter(u)
+    on = np.abs(s[:, None] - stops).min(axis=1, initial=np.inf) > AT * path.length
+    if not on.any():
+        return
+    u, s = u[on][:1], s[on][:1]
+    place = float(s[0])
+    before = along.motion(s, np.nextafter(u, -np.inf))[0]
+    after = along.motion(s, u)[0]
+    jump = (
+        f"the curvature jumps from {before.curvature[0]:.4g} to {after.curvature[0]:.4g} 1/m here"
+    )
+    remedy = f"stop here (stops = [{place!r}]), or lead over with a clothoid"
+    if along.steers:
+        raise InfeasibleError("steering", place, f"{jump}, and with it steering angles: {remedy}")
+    still = replace(before, twist_rate=0 * before.twist_rate, turning_rate=0 * before.turning_rate)
+    turn = np.array([[0.0, 0.0, 1.0]])
+    turning = replace(still, twist_rate=turn, turning_rate=turn)
+    for limit in limits:
+        rows = [limit.rows(_with_wheels(along, m), along.robot) for m in (still, turning)]
+        (a, b, c), others = ((r.a, r.b, r.c) for r in rows)
+        if not all(map(np.array_equal, (a, b, c), others)):
+            reason = f"{jump}, and with it wheel speeds, which '{limit.name}' forbids: {remedy}"
+            raise InfeasibleError(limit.name, place, reason)
+
+
+def _with_wheels(along: Track, samples: PathSamples) -> PathSamples:
+    """Samples with wheels as the robot's file draws them."""
+    if along.robot is None:
+        return samples
+    twists = samples.twist, samples.twist_rate
+    return replace(samples, wheel_states=lambda: along.steering.rigid(*twists))

@@ -3,7 +3,7 @@
 Distances between polygons are exact at the places looked at. Between two of them, a and b, no point
 of the outline moves farther than M, the integral of |dp| + reach |d yaw|, so nowhere between can it
 be nearer than (d_a + d_b - M) / 2. Intervals are halved until that bound is close enough. M is
-itself bounded from the control values of the derivatives on the interval, which hold their range.
+itself bounded by ``Path.swept``.
 """
 
 from __future__ import annotations
@@ -63,13 +63,12 @@ def path_clearance(
     the bound is ``enough`` (m) already.
     """
     reach = float(np.hypot(*np.transpose(footprint)).max())
-    knots, cubics = path.scaled_cubics
-    scale = path.turning_length if path.heading is not None else 0.0
+    knots = np.asarray(path.basis.knots)
     share = np.arange(_FIRST) / _FIRST
     u = np.append((knots[:-1, None] + np.diff(knots)[:, None] * share).ravel(), knots[-1])
     d, which = _distances(path, u, footprint, keep_out)
     for _ in range(_MOST_ROUNDS):
-        travel = _travel(knots, cubics, scale, u[:-1], u[1:], reach)
+        travel = path.swept(u[:-1], u[1:], reach)
         bound = (d[:-1] + d[1:] - travel) / 2
         open_ = bound < min(d.min() - tolerance, enough)
         middle = (u[:-1] + u[1:]) / 2
@@ -103,38 +102,3 @@ def _distances(
         depths = [depth_of(keep_out.solids[k], outlines[i]) for k in met]
         d[i], which[i] = -max(depths), met[int(np.argmax(depths))]
     return d, which
-
-
-def _travel(
-    knots: Array, cubics: Array, scale: float, left: Array, right: Array, reach: float
-) -> Array:
-    """(N,): at least the way (m) of any point within ``reach`` of the origin, on intervals inside
-    segments."""
-    i = np.clip(np.searchsorted(knots, left, side="right") - 1, 0, len(cubics) - 1)
-    c, h = cubics[i], (right - left)[:, None]
-    t0, t1 = (left - knots[i])[:, None], (right - knots[i])[:, None]
-
-    def first(t: Array) -> Array:
-        return np.asarray(c[:, 1] + t * (2 * c[:, 2] + t * 3 * c[:, 3]))
-
-    def second(t: Array) -> Array:
-        return np.asarray(2 * c[:, 2] + 6 * t * c[:, 3])
-
-    # Control values of the quadratic derivative on the interval: its range lies between them.
-    q = np.stack([first(t0), first(t0) + h / 2 * second(t0), first(t1)])
-    way = h[:, 0] * np.hypot(q[..., 0], q[..., 1]).mean(axis=0)
-    if scale > 0:  # a heading of its own: the last column, times the turning length
-        return np.asarray(way + reach * h[:, 0] * np.abs(q[..., -1]).mean(axis=0) / scale)
-    mid = (t0 + t1) / 2
-    a, m, b = (_cross(first(t), second(t)) for t in (t0, mid, t1))
-    bend = np.max(np.abs([a, 2 * m - (a + b) / 2, b]), axis=0)
-    ahead = q.sum(axis=0)
-    size = np.hypot(ahead[:, 0], ahead[:, 1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slowest = np.min(np.sum(q[..., :2] * ahead[:, :2], axis=2), axis=0) / size
-        turn = np.where(slowest > 0, h[:, 0] * bend / slowest**2, np.inf)
-    return np.asarray(way + reach * turn)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -5,19 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from math import factorial
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array
 from trajopt.errors import InfeasibleError
-from trajopt.paths.path import Path
+from trajopt.paths.path import SETTLED, Path, row
 from trajopt.paths.series import Series
 from trajopt.paths.spline import SplineBasis
 from trajopt.world.ground import Ground
 
 ON_GROUND = 1e-3  # m; a path in space this close to the ground lies on it; chosen
 _GRAINS = 10  # lengths of the ground's grain between two knots; chosen: 20 gridpoints and more
+_GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(8)
 _LOOK = 64  # places a segment between which a path may cross a line of the ground; chosen
 _HALVINGS = 60  # of such a stretch: down to rounding
 _MERGE = 1e-9  # knots closer than this share of the path are one
@@ -33,6 +35,40 @@ class LaidPath(Path):
     plane: Path | None = None
     ground: Ground | None = None
 
+    plain: ClassVar[bool] = False
+
+    @property
+    def orders(self) -> int:  # type: ignore[override]
+        return self._plane.orders
+
+    @property
+    def _plane(self) -> Path:
+        assert self.plane is not None
+        return self.plane
+
+    @property
+    def joints(self) -> Array:
+        return self._plane.joints
+
+    @property
+    def jumps(self) -> Array:
+        return self._plane.jumps
+
+    def facing(self, u: ArrayLike) -> Array:
+        return self._plane.facing(u)
+
+    def swept(self, left: Array, right: Array, reach: float) -> Array:
+        return self._plane.swept(left, right, reach)
+
+    def standstill(self, share: float) -> float | None:
+        return super().standstill(share) if self._plane.plain else self._plane.standstill(share)
+
+    def _evaluate(self, u: ArrayLike, derivative: int) -> Array:
+        plane = self._plane
+        if plane.plain:
+            return super()._evaluate(u, derivative)
+        return plane._evaluate(u, derivative)
+
     def position(self, u: ArrayLike, derivative: int = 0) -> Array:
         p = super().position(u, derivative)
         x, y = ground_plan(self, u, derivative)
@@ -43,8 +79,7 @@ class LaidPath(Path):
     @cached_property
     def _cubics(self) -> tuple[Array, Array]:
         """Those of the plane path, about the knots here."""
-        assert self.plane is not None
-        knots, plane = np.asarray(self.basis.knots), self.plane
+        knots, plane = np.asarray(self.basis.knots), self._plane
         parts = []
         for k in range(4):
             part = plane.position(knots[:-1], k)[:, :2]
@@ -52,6 +87,61 @@ class LaidPath(Path):
                 part = np.column_stack([part, plane.yaw(knots[:-1], k)])
             parts.append(part / factorial(k))
         return knots, np.stack(parts, axis=1)
+
+    @cached_property
+    def _table(self) -> tuple[Array, Array]:
+        """As a path's. Cells are halved until that changes nothing: ds/du has branch points near
+        sharp bends."""
+        left, right = self._knots[:-1], self._knots[1:]
+        whole = self._integrate(left, right)
+        starts, lengths, scale = list[Array](), list[Array](), 0.0
+        for done in range(_HALVINGS):
+            middle = (left + right) / 2
+            first, second = self._integrate(left, middle), self._integrate(middle, right)
+            scale = scale or float(np.sum(first + second))
+            off = np.abs(first + second - whole) > SETTLED * scale
+            off &= (middle > left) & (middle < right)
+            if done == _HALVINGS - 1:
+                off[:] = False
+            starts += [left[~off], middle[~off]]
+            lengths += [first[~off], second[~off]]
+            if not off.any():
+                break
+            left, right = (
+                np.concatenate([left[off], middle[off]]),
+                np.concatenate([middle[off], right[off]]),
+            )
+            whole = np.concatenate([first[off], second[off]])
+        u, gained = np.concatenate(starts), np.concatenate(lengths)
+        order = np.argsort(u)
+        s = np.concatenate([[0.0], np.cumsum(gained[order])])
+        return np.append(u[order], self.end), s
+
+    def _integrate(self, a: Array, b: Array) -> Array:
+        """Path parameter gained from a to b (each inside one quadrature cell)."""
+        half = (b - a) / 2
+        nodes = (a + b)[:, None] / 2 + half[:, None] * _GAUSS_X
+        return np.asarray((self.rate(nodes.ravel()).reshape(nodes.shape) @ _GAUSS_W) * half)
+
+    def parameter(self, u: ArrayLike) -> Array:
+        u, (grid, s) = row("u", u), self._table
+        i = np.clip(np.searchsorted(grid, u, side="right") - 1, 0, len(grid) - 2)
+        return np.asarray(s[i] + self._integrate(grid[i], u))
+
+    def locate(self, s: ArrayLike) -> Array:
+        grid, table = self._table
+        s = np.clip(row("s", s), 0.0, self.length)
+        i = np.clip(np.searchsorted(table, s, side="right") - 1, 0, len(grid) - 2)
+        left, right, width = grid[i], grid[i + 1], table[i + 1] - table[i]
+        share = (s - table[i]) / np.where(width > 0, width, 1.0)
+        u = left + (right - left) * share
+        for _ in range(8):
+            residual = table[i] + self._integrate(left, u) - s
+            rate = self.rate(u)
+            u = np.clip(u - residual / np.where(rate > 0, rate, np.inf), left, right)
+            if np.all(np.abs(residual) <= 1e-11 * width):  # the step just taken squares it
+                break
+        return np.asarray(u)
 
 
 def lay(path: Path, ground: Ground) -> Path:
@@ -121,7 +211,7 @@ def _knots(path: Path, ground: Ground) -> Array:
 
 def plan_series(path: Path, u: ArrayLike, order: int) -> tuple[Series, Series]:
     """x and y of a path as series in u; at a knot, of the segment to the right."""
-    d = [Path.position(path, u, k) for k in range(min(order, 3) + 1)]
+    d = [Path.position(path, u, k) for k in range(min(order, path.orders) + 1)]
     x, y = (Series.of([part[:, k] for part in d], order) for k in (0, 1))
     return x, y
 

@@ -75,14 +75,15 @@ def frame_on(
         surface = compose(ground, *at, 0, 0, order)
     else:  # in space: its own height
         surface = Series.of([path.position(u, k)[:, 2] for k in range(4)], order)
+    sign = 1.0 if path.plain else path.facing(u)
     pace = x.d() * x.d() + y.d() * y.d() + surface.d() * surface.d()
     if path.heading is not None:
         turn = Series.of([path.turning_length * path.yaw(u, k) for k in range(4)], order).d()
         pace = pace + turn * turn
     if ground.level:
-        return _along(x.cut(order), y.cut(order), surface, own, pace.sqrt())
+        return _along(x.cut(order), y.cut(order), surface, own, pace.sqrt(), sign)
     if contacts is not None and ground.bends:
-        ahead_of = own if own is not None else _direction(x, y)
+        ahead_of = own if own is not None else _direction(x, y, sign)
         z, slope_x, slope_y = _plane_under(ground, path, u, (x, y), ahead_of, contacts)
     else:
         z = surface
@@ -95,7 +96,11 @@ def frame_on(
     else:
         travel = (x.d(), y.d(), z.d())
         off = scaled(up, dot(travel, up))
-        ahead = (travel[0] - off[0], travel[1] - off[1], travel[2] - off[2])
+        ahead = (
+            (travel[0] - off[0]) * sign,
+            (travel[1] - off[1]) * sign,
+            (travel[2] - off[2]) * sign,
+        )
     forward = unit(ahead)
     return Frame(origin, forward, cross(up, forward), up, pace.sqrt())
 
@@ -106,6 +111,7 @@ def _along(
     z: Series,
     own: tuple[Series, Series] | None,
     pace: Series,
+    sign: float | Array,
 ) -> Frame:
     """Frames where the path itself is the ground: its lateral axis stays level."""
     zero = Series(np.zeros((x.order, *x.c[0].shape)))
@@ -113,7 +119,8 @@ def _along(
         cos, sin = own
         up = (zero, zero, zero + 1.0)
         return Frame((x, y, z), (cos, sin, zero), (-sin, cos, zero), up, pace)
-    forward, (cos, sin) = unit((x.d(), y.d(), z.d())), _direction(x, y)
+    forward = unit((x.d() * sign, y.d() * sign, z.d() * sign))
+    cos, sin = _direction(x, y, sign)
     left = (-sin, cos, zero)
     return Frame((x, y, z), forward, left, cross(forward, left), pace)
 
@@ -165,9 +172,10 @@ def twist_bend(frame: Frame) -> Array:
     return np.column_stack([frame.rate(frame.rate(c)).at(0) for c in (v[0], v[1], w[2])])
 
 
-def _direction(x: Series, y: Series) -> tuple[Series, Series]:
-    """Cosine and sine of the direction of travel in the ground plan."""
-    length = (x.d() * x.d() + y.d() * y.d()).sqrt()
+def _direction(x: Series, y: Series, sign: float | Array) -> tuple[Series, Series]:
+    """Cosine and sine of the direction of travel in the ground plan, or where ``sign`` is -1 of the
+    opposite one."""
+    length = (x.d() * x.d() + y.d() * y.d()).sqrt() * sign
     return x.d() / length, y.d() / length
 
 
