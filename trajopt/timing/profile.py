@@ -99,7 +99,7 @@ def excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]:
     from trajopt.timing import reach
 
     over, factor, table = np.empty(len(cells.d)), np.empty(len(cells.d)), cells.table
-    rows = table.a, table.b, table.c, cells.cap
+    rows = table.a, table.b, table.c, table.bounds
     reach.excess(cells.d, cells.left, cells.right, *rows, y, u0, u1, over, factor)
     return over, factor
 
