@@ -51,6 +51,9 @@ HILLS, HILL = 0.3, 20.0
 # bear 2.5 % of the weight, and tyres that give let them bounce off the ground as braking begins
 LOAD = 0.2
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
+FAST = (
+    1.2  # m/s, beyond: at 1 m/s braking is so short that the mean over ``SLIP_TIME`` hides the slip
+)
 LEFT = "left physics"
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are left out, for
 # on them a robot leans before it tips, which the limit does not know. Castors are blocked, for else PowerBot turns about its lower
@@ -181,11 +184,8 @@ def safe_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[
 
 
 def plan_beyond(name: str, place: str, friction: float) -> Trajectory:
-    """A motion planned with BEYOND of the friction that all wheels have together. The square
-    of its top speed follows the friction, so that it speeds up and brakes over the same stretches on
-    all of them: at one speed it is so short that the mean over ``SLIP_TIME`` hides the slip."""
-    speed = SPEED * math.sqrt(friction / FRICTIONS[0])
-    return plan(name, place, friction, BEYOND, "capacity", speed)
+    """A motion planned with BEYOND of the friction that all wheels have together."""
+    return plan(name, place, friction, BEYOND, "capacity", FAST)
 
 
 def beyond_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[float]) -> Rows:
