@@ -127,6 +127,13 @@ def test_wild_motions_keep_all_limits_wherever_they_are_sampled():
     assert near >= 0.97 * timed
 
 
+@pytest.mark.parametrize("seed", [5723, 6337])
+def test_narrow_peaks_are_seen(seed):
+    """Found by the long test: the direction of travel turns round where the robot nearly turns on the
+    spot; the least of two bounds peaks where it has a kink."""
+    assert judge(seed).wrong == ()
+
+
 @pytest.mark.slow
 def test_ten_thousand_wild_motions():
     timed, near, errors = run(range(1000, 11_000), 8)

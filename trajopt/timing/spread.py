@@ -21,6 +21,7 @@ _TURN, _SWING, _RATIO = (
     0.15,
     1.5,
 )  # rad, rad, factor on dsigma/du: a first cell at most; chosen
+_MOVES = 1e-6  # of a twist, as in limits/acceleration: what moves less turns on the spot
 _DEEPEST = 50  # halvings of a cell
 MOST_CELLS = 300_000  # that turn little: some 50,000 turns; chosen, for memory
 _OF_TURN, _OF_SWING, _OF_BEND, _OF_RATIO = (
@@ -36,7 +37,8 @@ _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(5)
 def pace(
     cubic: Array, t: float, length: float, free: bool
 ) -> tuple[float, float, float, float, float]:
-    """dsigma/du, |dpsi/du| with its sign, and n, at a place of a segment."""
+    """dsigma/du, the larger turning per u of robot and direction of travel, and n, at a place of a
+    segment."""
     x1 = cubic[1, 0] + t * (2 * cubic[2, 0] + t * 3 * cubic[3, 0])
     y1 = cubic[1, 1] + t * (2 * cubic[2, 1] + t * 3 * cubic[3, 1])
     square = x1 * x1 + y1 * y1
@@ -48,9 +50,13 @@ def pace(
         cos, sin = np.cos(yaw), np.sin(yaw)
         if rate <= 0:
             return 0.0, turn, 1.0, 0.0, 0.0
+        swing = abs(turn)
+        if square > (_MOVES * rate) ** 2:  # the direction of travel turns as well
+            x2, y2 = 2 * cubic[2, 0] + t * 6 * cubic[3, 0], 2 * cubic[2, 1] + t * 6 * cubic[3, 1]
+            swing = max(swing, abs(x1 * y2 - y1 * x2) / square)
         return (
             rate,
-            turn,
+            swing,
             (cos * x1 + sin * y1) / rate,
             (cos * y1 - sin * x1) / rate,
             length * turn / rate,
