@@ -41,7 +41,7 @@ def main() -> None:
         "run": [run_line(store, budgets)],
         "answers": answer_lines(tables),
         "budgets": budget_lines(budgets),
-        "parts": part_lines(tables),
+        "parts": part_lines(budgets),
         "shares": share_lines(tables, report),
         "peers": statistics.replace("## ", "### ").split("\n", 2)[2].splitlines(),
         "best": beaten_lines(tables)[:1],
