@@ -47,9 +47,9 @@ SPEED, LENGTH, BEND = 1.0, 2.0, 0.08  # m/s, m, m: a slight S in two metres
 # stands on all its wheels within their give of 1 mm; on sharper ground two carry it and the limits,
 # which know a suspension, are too hopeful
 HILLS, HILL = 0.3, 20.0
-LOAD = (
-    0.1  # of an even share, left on every wheel: PowerBot would brake with its castors in the air
-)
+# Of an even share, left on every wheel: PowerBot would brake with its castors in the air. At 0.1 they
+# bear 2.5 % of the weight, and tyres that give let them bounce off the ground as braking begins
+LOAD = 0.2
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
 LEFT = "left physics"
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are left out, for

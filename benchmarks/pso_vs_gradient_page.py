@@ -1,7 +1,7 @@
 """Bring docs/pso_vs_gradient.md up to date with the rows of a benchmark.
 
 Run as ``python -m benchmarks.pso_vs_gradient_page [STORE ...]`` after ``trajopt bench
-benchmarks/pso_vs_gradient.toml`` and ``python -m benchmarks.peers.pso_statistics``. Replaces what stands between the markers of the page and of README (tables) and
+benchmarks/pso_vs_gradient.toml`` and ``python -m benchmarks.peers.pso_statistics``. Replaces what stands between the markers of the page and of docs/compared.md (tables) and
 the page's three pictures; the words around them are written by hand, so read them again. The whole report
 (every table) is ``trajopt bench report STORE``.
 """
@@ -22,7 +22,7 @@ from trajopt.bench.tables import SOLVED, BenchTables
 from trajopt.report.files import markdown
 from trajopt.sweeps.store import open_store
 
-PAGE, README = ROOT / "docs" / "pso_vs_gradient.md", ROOT / "README.md"
+PAGE, COMPARED = ROOT / "docs" / "pso_vs_gradient.md", ROOT / "docs" / "compared.md"
 PICTURES = ("families", "ecdf", "profiles")
 COLOURS = 48  # of a picture, chosen
 
@@ -59,9 +59,9 @@ def main() -> None:
     for name, lines in parts.items():
         text = replaced(text, name, "\n".join(lines))
     PAGE.write_text(text, encoding="utf-8")
-    readme_part = [*readme_lines(tables, list(budgets)[-1]), "", parts["run"][0]]
-    readme = README.read_text(encoding="utf-8")
-    README.write_text(replaced(readme, "optimizers", "\n".join(readme_part)), encoding="utf-8")
+    short = [*short_lines(tables, list(budgets)[-1]), "", parts["run"][0]]
+    text = COMPARED.read_text(encoding="utf-8")
+    COMPARED.write_text(replaced(text, "optimizers", "\n".join(short)), encoding="utf-8")
     save_bench_pictures(tables, report)
     for name in PICTURES:
         small_picture(
@@ -69,7 +69,7 @@ def main() -> None:
         )
 
 
-def readme_lines(tables: BenchTables, budget: str) -> list[str]:
+def short_lines(tables: BenchTables, budget: str) -> list[str]:
     """How each optimizer does on the searches of the double wheel, by family."""
     shares = {name: found for name, found in tables.shares().items() if "newton" in found}
     shares = {name: found for name, found in shares.items() if "SMDW" in name}

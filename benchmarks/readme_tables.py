@@ -1,7 +1,8 @@
-"""Tables of README.md from the last benchmark runs: `python -m benchmarks.readme_tables`.
+"""Tables of docs/compared.md and docs/climbing.md from the last benchmark runs: `python -m
+benchmarks.readme_tables`.
 
-Run first: `python -m benchmarks.peers.time_scaling`, `python -m benchmarks.peers.swarm_speed`, `python -m benchmarks.theses.climb` with both engines, `python -m
-benchmarks.theses.closed_loop`. The tables stand between markers in README.md.
+Run first: `python -m benchmarks.peers.time_scaling`, `python -m benchmarks.peers.swarm_speed`, `python
+-m benchmarks.theses.climb` with both engines, `python -m benchmarks.theses.closed_loop`. The tables stand between markers.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from benchmarks.theses.climb_tables import THESIS
 from benchmarks.theses.closed_loop import SETTINGS
 from trajopt.report.intervals import wilson
 
-README, RESULTS = Path("README.md"), Path("out/benchmarks")
+DOCS, RESULTS = Path("docs"), Path("out/benchmarks")
+COMPARED, CLIMBING = DOCS / "compared.md", DOCS / "climbing.md"
 START, END = "<!-- tables: python -m benchmarks.readme_tables -->", "<!-- end of tables -->"
 CLIMBS, END_OF_CLIMBS = (
     "<!-- climbs: python -m benchmarks.readme_tables -->",
@@ -126,16 +128,15 @@ def _share(up: pd.Series) -> str:
 
 
 def main() -> None:
-    """Rewrite the tables in README.md."""
-    text = README.read_text(encoding="utf-8")
-    for start, end, lines in (
-        (START, END, peers()),
-        (CLIMBS, END_OF_CLIMBS, climbs()),
+    """Rewrite the tables of both pages."""
+    for page, start, end, lines in (
+        (COMPARED, START, END, peers()),
+        (CLIMBING, CLIMBS, END_OF_CLIMBS, climbs()),
     ):
-        before, rest = text.split(start)
+        before, rest = page.read_text(encoding="utf-8").split(start)
         text = "\n".join([before + start, "", *lines, end + rest.split(end)[1]])
-    README.write_text(text, encoding="utf-8")
-    print(f"wrote the tables of {README}")
+        page.write_text(text, encoding="utf-8")
+        print(f"wrote the tables of {page}")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ class Walk:
             if found < value:
                 best, value = tried, found
             else:
-                step *= 0.98
+                step = max(0.98 * step, 1e-9)
 
 
 OPTIMIZERS = {"walk": Walk}

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from trajopt.errors import ArgumentError
-from trajopt.optimize.base import Budget
+from trajopt.optimize.base import Budget, Status
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
 
 ROOT = Path(__file__).parents[2]
@@ -119,3 +119,21 @@ def test_benchmarks_take_it_by_the_variable_and_by_the_option(tmp_path: Path) ->
         done = run("-c", command, "bench", "report", store, "--out", str(page), plugins=plugins)
         assert done.returncode == 0, done.stderr
         assert NAME in (page / "index.md").read_text(encoding="utf-8")
+
+
+class Stuck:
+    """Asks for the same candidate for ever."""
+
+    name = "stuck"
+    needs = frozenset()
+    stochastic = False
+
+    def search(self, run, start, rng):  # noqa: ARG002
+        while True:
+            run.cost(run.bounds[:, 0])
+
+
+def test_a_method_that_asks_for_the_same_candidate_for_ever_is_ended():
+    found = minimize(lambda x: float(x[0]), [[0, 1]], optimizer=Stuck())
+    assert found.nfev == 1
+    assert found.status is Status.STALLED

@@ -20,6 +20,8 @@ from benchmarks.ground_physics import (
     tip_slope,
     tipped,
 )
+from trajopt.limits.slip import Slip
+from trajopt.limits.speed import Speed
 from trajopt.paths.path import Path
 from trajopt.robots import robot
 from trajopt.robots.steering import steering_of
@@ -31,6 +33,7 @@ from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import stage
 from trajopt.simulate.standing import standing
 from trajopt.simulate.stepping import open_session
+from trajopt.timing.scaling import time_scale
 from trajopt.world.ground import Ground
 from trajopt.world.laid import lay
 from trajopt.world.mesh import Mesh
@@ -149,6 +152,17 @@ def test_a_sample_drives_as_planned(name: str, place: str) -> None:
     as_planned(name, place, 0.6, "mujoco")
 
 
+def test_powerbot_keeps_its_way_across_a_slope() -> None:
+    """8 deg: it was 7.9 m off once, planned as on level ground."""
+    across = Plane(math.radians(8), math.pi / 2)
+    line = Path.through([[0, 0], [2, 0]])
+    limits = (Speed(1.0), Slip(0.332))
+    found = time_scale(line, limits, robot=robot("powerbot"), ground=across)
+    report = driven(found, 0.332, "pybullet")
+    assert report.final_distance < 0.02
+    assert report.slip_share < 0.01
+
+
 def as_planned(name: str, place: str, friction: float, engine: str) -> None:
     trajectory = plan(name, place, friction, 0.8)
     report = driven(trajectory, friction, engine)
@@ -158,10 +172,10 @@ def as_planned(name: str, place: str, friction: float, engine: str) -> None:
         assert report.steering_error.max() < 0.01
     moving = report.recording.times < trajectory.duration
     off = np.abs(report.recording.loads - report.wheel_plan.loads)[moving].mean(axis=0)
-    # rims of rollers are not quite round: wheels that turn are lifted
-    assert off.max() < (0.15 if name == "loc8" else 0.05) * machine_weight(name)
+    assert off.max() < 0.05 * machine_weight(name)
     closed = driven(trajectory, friction, engine, closed=True)
     assert closed.final_distance < 0.02
+    assert closed.slip_share < 0.03
 
 
 def machine_weight(name: str) -> float:
@@ -194,10 +208,6 @@ def test_a_sample_slips_beyond_its_limits() -> None:
 def test_all_slip_beyond_what_their_wheels_hold_together(
     name: str, place: str, friction: float, engine: str
 ) -> None:
-    if (name, place, engine) == ("loc8", "rough", "pybullet"):
-        # rims of rollers are not quite round: the two wheels that turn are lifted and bear 60 % of
-        # the weight, where the limit counts on half
-        pytest.skip("3.4 to 3.6 % measured")
     assert beyond(name, place, friction, engine) > 0.06
 
 

@@ -32,6 +32,7 @@ from trajopt.optimize.workers import Pool
 Progress = Callable[[int, float], None]  # called with evaluations used and the best cost
 Callback = Callable[[Array, float, float], Any]  # with the best x, its cost and violation
 
+_REPEATS = 1000  # times in a row that a method may ask for the same candidate, chosen
 _PORTION = 0.02  # s that one call of a batch may take near the deadline, chosen
 _APART = 1e-3  # of the width by which candidates differ that show how a function works, chosen
 _ENDED_FROM_OUTSIDE = (Status.INTERRUPTED, Status.CALLBACK)
@@ -54,6 +55,7 @@ class Run(Limited):
         self._single = Capability.BATCH not in self.objective.provides
         self._pace = math.inf  # s that one candidate takes, inf before the first
         self._point: tuple[Array, Evaluation] | None = None
+        self._repeats = 0
         self._derivatives = Derivatives(self)
 
     # -- evaluating
@@ -95,7 +97,11 @@ class Run(Limited):
         """Evaluation of one candidate (d,); a method that asks for the last one again pays once."""
         x = np.clip(x, self._low, self._high)  # undo rounding beyond the bounds
         if self._point is None or not np.array_equal(x, self._point[0]):
-            self._point = x.copy(), self.evaluate(x[None], inside=True)
+            self._point, self._repeats = (x.copy(), self.evaluate(x[None], inside=True)), 0
+        else:
+            self._repeats += 1
+            if self._repeats > _REPEATS:  # it would go on for ever, as repeats cost no budget
+                self._over(Status.STALLED)
         return self._point[1]
 
     def cost(self, candidate: Array) -> float:

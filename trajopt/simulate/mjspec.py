@@ -15,8 +15,11 @@ from trajopt.world.height_map import HeightMap
 # never each other.
 WHEELS, GROUND, OUTLINE, OBSTACLES, NOTHING = (1, 2), (2, 1), (4, 8), (8, 4), (0, 0)
 ROTOR = 1e5  # kg m^2, chosen: no torque of a wheel changes its speed
-# On smooth ground friction is that much stiffer than the contact, chosen: at 1 robots creep down slopes
-FRICTION_IMPEDANCE = 10.0
+# On smooth ground friction is that much stiffer than the contact, chosen. Under soft contacts what has
+# to hold creeps by less than 1 mm/s; with hard rollers the solver would let motors slip (measured).
+FRICTION_IMPEDANCE, HARD_FRICTION_IMPEDANCE = 1e4, 10.0
+NO_FRICTION = 1e-5  # the least that MuJoCo takes
+SHORT = 1e-6  # m, half the length of a sphere as a capsule
 STEERING_RATE = 100.0  # rad/s, natural frequency of a steering servo with its gear; chosen
 GROUND_COLOUR: Colour = (0.75, 0.62, 0.42)
 
@@ -50,9 +53,11 @@ class SpecBuilder:
         self.meshes: dict[Shape, str] = {}
         spec.compiler.balanceinertia, spec.compiler.degree = False, False
         spec.option.timestep, spec.option.iterations = options.step, options.iterations
-        self.smooth = not stage.broken
+        self.smooth, self.uneven = not stage.broken, stage.uneven
         if self.smooth:
-            spec.option.impratio = FRICTION_IMPEDANCE
+            rollers = any(link.joint.role == "roller" for link in model.links)
+            hard = rollers and not self.uneven
+            spec.option.impratio = HARD_FRICTION_IMPEDANCE if hard else FRICTION_IMPEDANCE
         spec.option.gravity = [0.0, 0.0, -STANDARD_GRAVITY]
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
@@ -146,19 +151,28 @@ class SpecBuilder:
             # friction is the larger of two, unless one has priority
             geom.priority = int(link.grip < 1.0)
             if link.wheel >= 0 and self.smooth:
-                self._meet(f"{name}_{i}", link)
+                self._meet(geom, link, ball=shape.kind == "sphere")
         for i, shape in enumerate(() if same else link.looks):
             self._shape(body, f"{name}_look_{i}", shape, NOTHING, link.colour)
         return body
 
-    def _meet(self, geom: str, link: Link) -> None:
+    def _meet(self, geom: Any, link: Link, *, ball: bool) -> None:
         """Contact of a wheel with the plane under it: a pair, whose friction has a time constant of
         its own. Where it has that of a soft contact, wheels slide outward in bends: MuJoCo leaves
-        out that directions of friction turn, and brings the slip to rest at that rate only."""
-        pair = self.spec.add_pair(name=f"meet_{geom}")
+        out that directions of friction turn, and brings the slip to rest at that rate only.
+
+        Soft balls of a roller hold along its axis alone. They differ in radius, so that two which touch
+        at once would slide against each other across it and have less left to hold along (measured:
+        up to a third). A capsule without length is a ball whose contacts MuJoCo lays along its axis.
+        """
+        grip = across = link.grip * self.friction
+        if ball and self.uneven and link.joint.role == "roller":
+            geom.type, across = self.mujoco.mjtGeom.mjGEOM_CAPSULE, NO_FRICTION
+            geom.size = [geom.size[0], SHORT, 0.0]
+        pair = self.spec.add_pair(name=f"meet_{geom.name}")
         pair.geomname1 = f"plate_{link.wheel}" if self.plates else "ground"
-        pair.geomname2, pair.condim = geom, 3
-        pair.friction = [link.grip * self.friction] * 2 + [0.0] * 3
+        pair.geomname2, pair.condim = geom.name, 3
+        pair.friction = [grip, across, 0.0, 0.0, 0.0]
         pair.solref = [self.options.contact_time, self.options.contact_damping]
         pair.solreffriction = pair.solref
 

@@ -21,17 +21,16 @@ from trajopt.simulate.motors import Motors
 from trajopt.simulate.plates import Plates
 from trajopt.simulate.scene import Stage
 from trajopt.simulate.stepping import Pace
-from trajopt.simulate.tyres import TYRE_SAG, give
+from trajopt.simulate.tyres import RIM_SAG, TYRE_SAG, give
 
 # Why this process has no graphics, once known: asked a second time, GLFW aborts the process.
 _NO_GRAPHICS: list[str] = []
-# Impedances of soft contacts, which act like mass the more the closer they are to 1; chosen: at 0.5 a
-# tall robot on tyres rocks until it falls over, at 0.9 rollers come down so hard that loads scatter
-TYRE_IMPEDANCE, ROLLER_IMPEDANCE = 0.9, 0.5
-# s, time constant of friction of soft rollers; chosen: sliding at v, MuJoCo lifts a soft contact by
-# about friction v / time over its stiffness, and the wheels of a rim that slides would take over load
-# from those that do not (at 4 ms a sixth of it, and a Mecanum robot planned beyond its grip held)
-ROLLER_FRICTION_TIME = 0.05
+# Impedance of soft contacts, chosen: the closer to 1, the more they act like mass, which rings under
+# wheels (measured: at 0.9 the loads of a swerve drive scatter by 8 % of its weight, at 0.01 by 1 %).
+IMPEDANCE = 0.01
+# 1/s at which friction of soft contacts brings sliding to rest, chosen: sliding at v, MuJoCo lifts the
+# contact by about friction rate v impedance / (1 - impedance) of the mass above it
+FRICTION_RATE = 400.0
 AWAY = (0.0, 0.0, -100.0)  # m, where an obstacle is that is out of the world
 
 
@@ -140,21 +139,22 @@ class _Session:
         a body with the inverse weight A: force = (k r + b v) / ((1 - d) A), with d the impedance.
         The contact is halfway between two surfaces: half the sag more radius keeps the lever.
         """
-        compiled = self.compiled
+        compiled, kinds = self.compiled, self.mujoco.mjtGeom
+        sags = {int(kinds.mjGEOM_SPHERE): TYRE_SAG, int(kinds.mjGEOM_CAPSULE): RIM_SAG}
         for pair, geom in enumerate(compiled.pair_geom2):
             link = self.model.links[self.link_of[geom]]
             soft = give(self.model, link)
             if soft is None or (link.joint.role == "roller" and not uneven):
                 continue
-            d = ROLLER_IMPEDANCE if link.joint.role == "roller" else TYRE_IMPEDANCE
-            weight = (1.0 - d) * compiled.body_invweight0[compiled.geom_bodyid[geom], 0]
-            compiled.pair_solref[pair] = [-soft[0] * weight, -soft[1] * weight]
-            compiled.pair_solimp[pair] = [d, d, 0.001, 0.5, 2.0]
-            if link.joint.role == "roller":
-                compiled.pair_solreffriction[pair] = [ROLLER_FRICTION_TIME, 1.0]
-            if compiled.geom_type[geom] == self.mujoco.mjtGeom.mjGEOM_SPHERE:
-                compiled.geom_size[geom, 0] += TYRE_SAG / 2.0
-                compiled.geom_rbound[geom] += TYRE_SAG / 2.0
+            kind = int(compiled.geom_type[geom])
+            contacts = 2.0 if kind == kinds.mjGEOM_CAPSULE else 1.0  # one at each end
+            weight = (1.0 - IMPEDANCE) * compiled.body_invweight0[compiled.geom_bodyid[geom], 0]
+            compiled.pair_solref[pair] = [-k * weight / contacts for k in soft]
+            compiled.pair_solimp[pair] = [IMPEDANCE, IMPEDANCE, 0.001, 0.5, 2.0]
+            compiled.pair_solreffriction[pair] = [2.0 / (IMPEDANCE * FRICTION_RATE), 1.0]
+            if kind in sags:
+                compiled.geom_size[geom, 0] += sags[kind] / 2.0
+                compiled.geom_rbound[geom] += sags[kind] / 2.0
 
     def place(self, start: Start) -> None:
         """Put the robot where it begins. Small angles keep their digits: whole turns are added

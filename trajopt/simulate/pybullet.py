@@ -214,12 +214,11 @@ class _Session:
             lateralFriction=link.grip * self.stage.scene.friction, spinningFriction=0.0,
             rollingFriction=0.0, restitution=0.0,
         )  # fmt: skip
-        rolls = link.joint.role == "roller"
-        if (
-            rolls and self.stage.uneven
-        ):  # friction along the axis alone: light rollers would never get up to speed
+        rolls, soft = link.joint.role == "roller", give(self.model, link)
+        if rolls and not self.stage.uneven:
+            soft = None
+        elif rolls:  # friction along the axis alone: light rollers would never get up to speed
             bullet.changeDynamics(robot, joint, anisotropicFriction=[0.0, 0.0, 1.0])
-        soft = None if rolls and not self.stage.uneven else give(self.model, link)
         if soft is not None:
             bullet.changeDynamics(robot, joint, contactStiffness=soft[0], contactDamping=soft[1])
         meets = WHEELS if link.meets == "ground" else OUTLINE

@@ -65,7 +65,7 @@ class Stage:
 
     @property
     def uneven(self) -> bool:
-        """Whether wheels have to give way to share the load: on slopes and hills, not on level
+        """Whether rollers have to give way to share the load: on slopes and hills, not on level
         ground, and not at steps, where rollers are what meets an edge."""
         level = self.plane is not None and self.plane.slope == 0.0
         return not (level or self.broken)
