@@ -90,7 +90,12 @@ def ground_of(name: str, place: str, friction: float) -> Ground:
 
 
 def plan(
-    name: str, place: str, friction: float, share: float, rule: Sharing | None = None
+    name: str,
+    place: str,
+    friction: float,
+    share: float,
+    rule: Sharing | None = None,
+    speed: float = SPEED,
 ) -> Trajectory:
     """A slight bend along the contour or, on the other grounds, between it and uphill; robots that
     can keep their heading. The slip limit has ``share`` of the friction, by the ``rule`` or, None,
@@ -102,7 +107,7 @@ def plan(
     path = Path.through(
         points @ np.array([[cos, sin], [-sin, cos]]), heading=[0.0, 0.0, 0.0] if keeps else None
     )
-    limits = (Speed(SPEED), Slip(share * friction, rule=rule), Tip(), Contact(LOAD))
+    limits = (Speed(speed), Slip(share * friction, rule=rule), Tip(), Contact(LOAD))
     return time_scale(path, limits, robot=machine, ground=ground_of(name, place, friction))
 
 
@@ -175,10 +180,18 @@ def safe_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[
             )  # fmt: skip
 
 
+def plan_beyond(name: str, place: str, friction: float) -> Trajectory:
+    """A motion planned with BEYOND of the friction that all wheels have together. Its top speed
+    follows the friction, so that it speeds up and brakes as long on all of them: the slip that is
+    measured is a mean over ``SLIP_TIME``."""
+    speed = SPEED * friction / FRICTIONS[0]
+    return plan(name, place, friction, BEYOND, "capacity", speed)
+
+
 def beyond_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[float]) -> Rows:
-    """Motions planned with BEYOND of the friction that all wheels have together."""
+    """Motions of ``plan_beyond``."""
     for name, place, friction in product(names, GROUNDS, frictions):
-        trajectory = plan(name, place, friction, BEYOND, "capacity")
+        trajectory = plan_beyond(name, place, friction)
         for engine in engines:
             share, off = LEFT, ""
             try:

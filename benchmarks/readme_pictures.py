@@ -1,4 +1,4 @@
-"""The pictures that README.md and docs/ground.md show.
+"""The pictures that README.md, docs/routes.md and docs/ground.md show.
 
 python -m benchmarks.readme_pictures                                rewrites docs/pictures/ but for
 the sweep python -m benchmarks.readme_pictures --climb out/sweeps/climb_rate  the two of the climb
@@ -24,10 +24,10 @@ from trajopt.sweeps.store import open_store
 
 FOLDER = Path("docs/pictures")
 PROBLEM = Path("problems/smdw/scenario_1_lateral.toml")
-# Of docs/ground.md and docs/paths.md: problem, picture of its run folder, name here.
+# Of docs/routes.md, docs/ground.md and docs/paths.md: problem, picture of its run folder, name here.
 ON_GROUND = (
+    (Path("problems/map/lab.toml"), "path.png", "lab.png"),
     (Path("problems/car/hill.toml"), "loads.png", "hill_loads.png"),
-    (Path("problems/car/bay.toml"), "path.png", "bay.png"),
     (Path("problems/car/bay.toml"), "path.png", "bay.png"),
     (Path("problems/asoc/field.toml"), "path.png", "field_path.png"),
 )
@@ -52,7 +52,7 @@ def approach() -> None:
 
 
 def on_ground() -> None:
-    """Solve problems on sloping ground, and keep a picture of each."""
+    """Solve problems on a map and on sloping ground, and keep a picture of each."""
     for file, picture, kept in ON_GROUND:
         with tempfile.TemporaryDirectory() as name:
             save_pictures(solve(load_problem(file)), name)

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from trajopt import Budget, Path, Robot, limit_jerk, minimize, optimize_path, robot, time_scale
+from trajopt import Budget, Path, Robot, limit_jerk, minimize, robot, time_scale
 from trajopt.control.commands import commands
 from trajopt.errors import ArgumentError, TrajoptError
 from trajopt.limits.friction import FrictionAlong, FrictionMap
 from trajopt.limits.limit import Limit
 from trajopt.limits.registry import LIMITS
 from trajopt.limits.speed import Speed
-from trajopt.refine.path import corridor
 from trajopt.timing.many import time_scale_many
 from trajopt.timing.nominal import nominal_timing
 from trajopt.timing.sensitivity import sensitivities
@@ -49,10 +48,6 @@ def square(z: Any) -> float:
 
 def rough(**given: Any) -> Any:
     return rough_ground(rng=np.random.default_rng(0), **given)
-
-
-def joint(**given: Any) -> Any:
-    return optimize_path(corridor(PATH), limits=SPEED, **given)
 
 
 def obstacle(kind: str) -> Callable[..., Any]:
@@ -146,7 +141,6 @@ CALLS: Mapping[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         lambda **k: minimize(square, optimizer="nelder-mead", **k),
         {"bounds": [[-1.0, 1.0]], "x0": [0.5], "seed": 0},
     ),
-    "optimize_path": (joint, {"bounds": [[-0.1, 0.1]], "trust": 0.1, "steps": 1}),
     "rough_ground": (rough, {"sigma": 0.1, "size": 2.0, "correlation": 0.2, "spacing": 0.5}),
     "differential": (
         Robot.differential,

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from trajopt.pipeline import solve, validate
     from trajopt.problem import Problem, load_problem
     from trajopt.refine.jerk import limit_jerk
-    from trajopt.refine.path import optimize_path
     from trajopt.refine.profile import follow
     from trajopt.robots.robot import Robot, robot, robot_names
     from trajopt.simulate.check import ValidationReport
@@ -80,7 +79,6 @@ _HOME = {
     "limit_jerk": "trajopt.refine.jerk",
     "load_problem": "trajopt.problem",
     "minimize": "trajopt.optimize.search",
-    "optimize_path": "trajopt.refine.path",
     "robot": "trajopt.robots.robot",
     "robot_names": "trajopt.robots.robot",
     "solve": "trajopt.pipeline",
@@ -122,7 +120,6 @@ __all__ = [
     "limit_jerk",
     "load_problem",
     "minimize",
-    "optimize_path",
     "robot",
     "robot_names",
     "solve",

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 
 from trajopt.robots.robot import Robot, robot
 
@@ -217,8 +218,6 @@ def slopes(name: str) -> Tables:
 
 def grid(name: str, folder: Path, cells: int = 2000, seed: int = 0) -> Tables:
     """A map of 2,000 x 2,000 cells as a map_server file, with a thousand discs and some walls."""
-    from PIL import Image
-
     _, length = size_of(robot(name))
     resolution = 0.05 * length / 0.9
     rng = np.random.default_rng(seed)
@@ -238,21 +237,46 @@ def grid(name: str, folder: Path, cells: int = 2000, seed: int = 0) -> Tables:
     ends = [(150, cells // 2), (cells - 150, cells // 3)]
     for x, y in ends:
         grey[y - room : y + room, x - room : x + room] = 254
-    Image.fromarray(grey[::-1]).save(folder / "grid.pgm")
+    _write_map(grey, folder, "grid", ".pgm", resolution)
+    (x0, y0), (x1, y1) = ((x * resolution, y * resolution) for x, y in ends)
+    found = _tables(name, "Grid of 2,000 x 2,000 cells", [x0, y0, 0.0], [x1, y1, 0.0])
+    found["map"] = {"file": str(folder / "grid.yaml")}
+    return found
+
+
+def _write_map(
+    grey: NDArray[np.uint8], folder: Path, name: str, kind: str, resolution: float
+) -> None:
+    """A map_server file and its picture; ``grey`` has row 0 at the least y."""
+    from PIL import Image
+
+    Image.fromarray(grey[::-1]).save(folder / f"{name}{kind}")
     keys = {
-        "image": "grid.pgm",
+        "image": f"{name}{kind}",
         "resolution": resolution,
         "origin": [0.0, 0.0, 0.0],
         "negate": 0,
         "occupied_thresh": 0.65,
         "free_thresh": 0.196,
     }
-    text = "\n".join(f"{key}: {value}" for key, value in keys.items())
-    (folder / "grid.yaml").write_text(text, encoding="utf-8")
-    (x0, y0), (x1, y1) = ((x * resolution, y * resolution) for x, y in ends)
-    found = _tables(name, "Grid of 2,000 x 2,000 cells", [x0, y0, 0.0], [x1, y1, 0.0])
-    found["map"] = {"file": str(folder / "grid.yaml")}
-    return found
+    text = "".join(f"{key}: {value}\n" for key, value in keys.items())
+    (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+
+
+def write_lab(folder: Path) -> None:
+    """The map of problems/map/lab.toml: three rooms with desks and pillars, 12 x 7 m."""
+    grey = np.full((140, 240), 254, dtype=np.uint8)
+    boxes = [
+        (0, 0, 12, 0.1), (0, 6.9, 12, 7), (0, 0, 0.1, 7), (11.9, 0, 12, 7),
+        (4.4, 0, 4.6, 4.4), (4.4, 5.9, 4.6, 7), (8.4, 0, 8.6, 1.0), (8.4, 2.5, 8.6, 7),
+        (1.4, 2.4, 3.2, 3.4), (0.1, 5.2, 1.0, 6.9), (5.4, 0.1, 7.4, 0.8), (9.4, 3.2, 10.2, 5.2),
+    ]  # fmt: skip
+    for x0, y0, x1, y1 in boxes:
+        grey[round(y0 * 20) : round(y1 * 20), round(x0 * 20) : round(x1 * 20)] = 0
+    y, x = (np.mgrid[:140, :240] + 0.5) / 20
+    for centre in ((6.5, 3.4), (3.0, 0.9)):
+        grey[(x - centre[0]) ** 2 + (y - centre[1]) ** 2 < 0.3**2] = 0
+    _write_map(grey, folder, "lab", ".png", 0.05)
 
 
 SCENES: dict[str, Callable[[str], Tables]] = {

@@ -35,14 +35,11 @@ from benchmarks.theses.powerbot_tables_encounters import encounter_three, encoun
 from trajopt.control.encounter import safe_speed
 from trajopt.errors import TrajoptError
 from trajopt.refine.jerk import limit_jerk
-from trajopt.refine.path import corridor, optimize_path
 from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.systems.powerbot.constants import FRICTION, LARGEST_SPEED
 from trajopt.systems.powerbot.limits import thesis_slip_acceleration, thesis_tip_acceleration
-from trajopt.world.ramp import lay_over
 
 SLOPES = (0.0, 5.99, -5.99)  # deg; Experiment 4's ramp
-CORRIDOR = 0.5  # m to either side of a knot, chosen: inside a hallway
 PACKAGES = ("numpy", "toppra", "numba", "casadi", "pybullet")
 
 
@@ -167,7 +164,7 @@ def minimum_times() -> ResultTable:
 
 
 def refinements(numbers: Sequence[int]) -> ResultTable:
-    """Jerk limits, and path and timing together."""
+    """Jerk limits."""
     rows = []
     for number in numbers:
         task = problem(number)
@@ -178,17 +175,7 @@ def refinements(numbers: Sequence[int]) -> ResultTable:
                 cells.append(f"{limit_jerk(base, jerk).duration:.2f}")
             except TrajoptError as error:
                 cells.append(type(error).__name__)
-        level, ramps = corridor(task.flat_path), [r.ramp for r in task.ground.ramps]
-        count = len(task.flat_path.basis.knots) - 2
-        found = optimize_path(
-            lambda z, level=level, ramps=ramps: lay_over(level(z), ramps) if ramps else level(z),
-            np.tile([-CORRIDOR, CORRIDOR], (count, 1)),
-            task.replace({"limits.variant": None, "limits.slip_rule": "load"}).limits,
-            robot=task.robot,
-            ground=task.scene.ground,
-            steps=6,
-        )
-        rows.append([*cells, f"{found.trajectory.duration:.2f}", f"{found.gain:.1%}"])
+        rows.append(cells)
     return ResultTable(
         "Refinement, physical limits, s",
         (
@@ -196,8 +183,6 @@ def refinements(numbers: Sequence[int]) -> ResultTable:
             "optimal",
             "jerk 4 m/s^3",
             "jerk 1 m/s^3",
-            f"path free by {CORRIDOR} m",
-            "gain over two stages",
         ),
         rows,
     )

@@ -22,7 +22,6 @@ from trajopt import (
     time_scale,
 )
 from trajopt.limits.speed_bound import SpeedProfile
-from trajopt.refine.path import corridor
 from trajopt.refine.profile import follow
 from trajopt.timing.track import track
 from trajopt.world.ramp import Ramp, Ramps
@@ -191,8 +190,6 @@ def test_what_does_not_stop_on_the_way_refuses_pieces():
         follow(path, SpeedProfile((0.0,), (0.5,)), SPEEDS, manner="least_squares")
     with pytest.raises(ArgumentError, match="one piece"):
         time_scale(path, SPEEDS, engine="linear")
-    with pytest.raises(ArgumentError, match="one spline"):
-        corridor(path)
 
 
 @pytest.mark.parametrize("engine", ["toppra", "bounds", "segments"])

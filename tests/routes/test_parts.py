@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import shapely
 from scipy.interpolate import BSpline, RectBivariateSpline
 
+from trajopt.arrays import Array
 from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
+from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
+from trajopt.paths.path import Path
+from trajopt.paths.samples import PathSamples
+from trajopt.paths.segments import Clothoid
 from trajopt.robots.robot import robot
 from trajopt.routes.bspline import as_path, knots_of
 from trajopt.routes.cells import kind_of, shared_numbers, symbols_of
 from trajopt.routes.cover import cover
-from trajopt.routes.envelope import envelope_of
+from trajopt.routes.envelope import Envelope, envelope_of
 from trajopt.routes.field import Field, field_of
 from trajopt.routes.ways import ways
+from trajopt.timing.track import track
 from trajopt.world.obstacles import Circle, Wall
 from trajopt.world.occupancy import OccupancyMap
+from trajopt.world.plane import Plane
 from trajopt.world.scene import Scene
 from trajopt.world.terrain import Flat
 
@@ -133,15 +138,73 @@ def test_an_envelope_of_a_differential_drive() -> None:
         np.array([[1.0, 0.0, -0.165], [1.0, 0.0, 0.165]]) / 0.0975 / 12
     )
     assert found.changes == pytest.approx([12 / 9] * 2)
-    assert 0 < found.ellipse[2] < 0.5 * 9.81
+
+
+def accelerations(samples: PathSamples, motion: tuple[Array, Array], envelope: Envelope) -> Array:
+    """(N, 4): what cones and planes of an envelope are linear in, from s'' and s'^2 (N,)."""
+    sdd, sd2 = motion
+    origin = (
+        samples.velocity[:, :2] * sdd[:, None] + samples.acceleration_rate[:, :2] * sd2[:, None]
+    )
+    yaw = samples.turning[:, 2] * sdd + samples.turning_rate[:, 2] * sd2
+    centripetal = (samples.turning[:, 2] ** 2 * sd2)[:, None] * envelope.cog
+    x, y, z = envelope.down
+    cos, sin = np.cos(samples.yaw), np.sin(samples.yaw)
+    gravity = 9.80665 * np.column_stack([cos * x + sin * y, cos * y - sin * x])
+    return np.column_stack([origin - centripetal - gravity, yaw, np.full(len(sdd), z)])
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.15])
+def test_cones_and_planes_are_the_limits(slope: float) -> None:
+    """Against friction used and rows on a curved path, on level ground and on a plane."""
+    body, slip, tip = robot("swerve"), Slip(0.5, rule="least_norm"), Tip()
+    ground = Plane(slope, 0.7)
+    envelope = envelope_of(body, (slip, tip), False, ground)
+    path = Path.through([[0, 0], [1.0, 0.6], [2.0, 0.2], [2.5, 1.5]])
+    along = track(path, body, ground)
+    s = np.linspace(0.05, 0.95, 60) * along.path.length
+    samples = along.samples(s, along.path.locate(s))
+    rng = np.random.default_rng(5)
+    sdd, sd2 = rng.uniform(-1.5, 1.5, 60), rng.uniform(0.0, 2.0, 60)
+    # On a plane the body's frame leans; headings in the ground plan differ by its square.
+    w = accelerations(samples, (sdd, sd2), envelope)
+    cone = np.einsum("cij,nj->cni", envelope.cones[:, 0], w)
+    inside = np.sqrt(np.cos(np.pi / slip.sides))
+    used = (np.linalg.norm(cone[..., :3], axis=2) / cone[..., 3]).max(axis=0) * inside
+    needed = slip.needed(samples, body, sdd, sd2)
+    assert used == pytest.approx(needed, rel=1e-9 if slope == 0 else 0.02)
+    rows = tip.rows(samples, body)
+    left = rows.c - rows.a * sdd[:, None] - rows.b * sd2[:, None]
+    level = tip.rows(track(path, body).samples(s[:1], path.locate(s[:1])), body).c
+    assert w @ envelope.planes[:, 0].T == pytest.approx(
+        left / level, abs=1e-9 if slope == 0 else 0.01
+    )
+
+
+def test_rows_of_a_car_follow_its_curvature() -> None:
+    """Friction by the rule of each wheel, at curvatures between those that were read."""
+    body, slip = robot("car"), Slip(0.6, rule="least_norm")
+    envelope = envelope_of(body, (slip,), False)
+    assert envelope.cones.shape[1] > 1
+    for bend in np.linspace(-0.95, 0.95, 6) * envelope.curvature:
+        path = Path.segments([Clothoid(1.0, bend, bend)], start=(0.0, 0.0, 0.0))
+        s = np.full(5, path.length / 2)
+        samples = track(path, body).samples(s, path.locate(s))
+        motion = np.linspace(-1.0, 1.0, 5), np.full(5, 1.0)
+        w = accelerations(samples, motion, envelope)
+        powers = samples.curvature[0] ** np.arange(envelope.cones.shape[1])
+        cone = np.einsum("cpij,p,nj->cni", envelope.cones, powers, w)
+        used = (np.linalg.norm(cone[..., :3], axis=2) / cone[..., 3]).max(axis=0)
+        needed = slip.needed(samples, body, *motion)
+        assert used == pytest.approx(needed, rel=0.01, abs=0.01)
 
 
 @pytest.mark.parametrize(("name", "free"), [("powerbot", False), ("car", False), ("loc8", True)])
 def test_derivatives_of_a_cell_and_its_discs(name: str, free: bool) -> None:
     """Central differences of CasADi's own values; a cell's value against NumPy."""
     body = robot(name)
-    envelope = envelope_of(body, (Speed(1.2), Acceleration(1.0, 1.4), WheelSpeed(12.0)), free)
-    envelope = replace(envelope, ellipse=(2.0, 3.0, 2.5))
+    limits = (Speed(1.2), Acceleration(1.0, 1.4), WheelSpeed(12.0), Slip(0.5), Tip())
+    envelope = envelope_of(body, limits, free, Plane(0.1, 0.4))
     kind = kind_of(envelope)
     symbols = symbols_of(kind, 3)
     rng = np.random.default_rng(3)
@@ -156,21 +219,26 @@ def test_derivatives_of_a_cell_and_its_discs(name: str, free: bool) -> None:
     )
     shared = shared_numbers(envelope, kind, [1.0, 0.3, 0.2, 0.1, 0.6])
     lam = rng.uniform(-1, 1, symbols.rows)
-    gradient, slopes = (np.asarray(m) for m in symbols.slopes(z, w, shared))
+
+    def first(at: Array) -> tuple[Array, Array]:
+        return np.asarray(symbols.gradient(at, w, shared)), np.asarray(
+            symbols.slopes(at, w, shared)
+        )
+
+    gradient, slopes = first(z)
     bends = np.asarray(symbols.bends(z, w, shared, 0.8, lam))
     bends = bends + np.triu(bends, 1).T
     h = 1e-6
     for k in range(len(z)):
         step = h * np.eye(len(z))[k]
-        high, low = (symbols.value(z + sign * step, w, shared) for sign in (1, -1))
         cost, row = (
-            (np.asarray(a) - np.asarray(b)).ravel() / (2 * h)
-            for a, b in zip(high, low, strict=True)
+            (np.asarray(f(z + step, w, shared)) - np.asarray(f(z - step, w, shared))).ravel()
+            / (2 * h)
+            for f in (symbols.cost, symbols.rows_of)
         )
         assert gradient[k] == pytest.approx(cost, rel=1e-5, abs=1e-6)
         assert slopes[:, k] == pytest.approx(row, rel=1e-5, abs=1e-5)
-        high_g, high_j = (np.asarray(m) for m in symbols.slopes(z + step, w, shared))
-        low_g, low_j = (np.asarray(m) for m in symbols.slopes(z - step, w, shared))
+        (high_g, high_j), (low_g, low_j) = first(z + step), first(z - step)
         bent = (0.8 * (high_g - low_g).ravel() + (high_j - low_j).T @ lam) / (2 * h)
         assert bends[:, k] == pytest.approx(bent, rel=1e-4, abs=1e-4)
     at, wn = z[: 4 * kind.axes], w[12:20]

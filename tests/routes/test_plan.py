@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from shapely import affinity
 
-from trajopt.paths.path import Path
+from benchmarks.routes.check import independent_clearance
 from trajopt.pipeline import solve
 from trajopt.problem import Problem
-from trajopt.robots.robot import Robot
 from trajopt.solution import Solution
 
 ROOM: dict[str, Any] = {
@@ -28,21 +26,6 @@ ROOM: dict[str, Any] = {
     "ground": {"friction": 0.5},
     "limits": {"speed": 1.0, "acceleration": 0.8, "deceleration": 0.8, "clearance": 0.05},
 }  # fmt: skip
-
-
-def independent_clearance(path: Path, robot: Robot, solids: list[shapely.Geometry]) -> float:
-    """Least distance of the outline at places at most 1 cm and 1 deg apart."""
-    outline, whole = shapely.Polygon(robot.footprint), shapely.union_all(solids)
-    u = np.linspace(path.start, path.end, 20_001)
-    place, yaw = path.position(u)[:, :2], np.unwrap(path.yaw(u))
-    moved = np.cumsum(np.append(0.0, np.linalg.norm(np.diff(place, axis=0), axis=1)))
-    turned = np.cumsum(np.append(0.0, np.abs(np.diff(yaw))))
-    cell = np.floor(np.maximum(moved / 0.01, turned / np.radians(1)) * 1.01)
-    least = np.inf
-    for i in np.flatnonzero(np.diff(cell, prepend=-1)):
-        there = affinity.rotate(outline, yaw[i], origin=(0, 0), use_radians=True)
-        least = min(least, affinity.translate(there, *place[i]).distance(whole))
-    return float(least)
 
 
 def solids_of(tables: dict[str, Any]) -> list[shapely.Geometry]:

@@ -77,7 +77,7 @@ class Slip(Limit):
     def _each(self, path: PathSamples, robot: Robot) -> tuple[Affine, Array]:
         """Rows of shares, and their size."""
         shares, sizes = [], []
-        for force, grip, size in self._shares(path, robot):
+        for force, grip, size in self.shares(path, robot):
             pair = force.a.shape[1] == 2
             normals = normals_of(self.sides) if pair else np.array([[1.0], [-1.0]])
             inside = np.cos(np.pi / self.sides) if pair else 1.0
@@ -91,7 +91,7 @@ class Slip(Limit):
         if self.rule_of(robot) == "capacity":
             return friction_used(path, robot, self._grips(path, robot)[0].at(sdd, sd2), sdd, sd2)
         worst = np.zeros(len(path.s))
-        for force, grip, _ in self._shares(path, robot):
+        for force, grip, _ in self.shares(path, robot):
             used = np.linalg.norm(force.at(sdd, sd2), axis=1)
             load = grip.at(sdd, sd2)[:, 0]
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -108,7 +108,7 @@ class Slip(Limit):
         mu = coefficients(f"{self.name}.friction", self.friction, path, robot)
         return contact_loads(path, robot) * mu, mu
 
-    def _shares(self, path: PathSamples, robot: Robot) -> list[tuple[Affine, Affine, Array]]:
+    def shares(self, path: PathSamples, robot: Robot) -> list[tuple[Affine, Affine, Array]]:
         """Force (N, 1 or 2), friction times load (N, 1), and friction (N or 1, 1) times share of
         the weight, for every wheel or for all together."""
         holds = holds_of(robot)

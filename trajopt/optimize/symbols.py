@@ -137,13 +137,6 @@ def stacked(parts: Sequence[Any]) -> Any:
     return ca.vertcat(*parts)
 
 
-def matrix(values: Array) -> Any:
-    """A matrix of numbers that multiplies expressions; zeros are left out."""
-    ca = casadi()
-
-    return ca.sparsify(ca.DM(values))
-
-
 def total(column: Any) -> Any:
     """Sum of a column of expressions."""
     ca = casadi()

@@ -14,24 +14,28 @@ import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.optimize.symbols import casadi
+from trajopt.robots.robot import STANDARD_GRAVITY
 from trajopt.routes.envelope import Envelope
 
 CELLS = 5  # to a segment of the spline; unaligned or coarser nodes lose up to 0.2 % of time
 SLOWEST, FASTEST = 0.4, 2.5  # bounds of |q'| as shares of its mean: no cusps, no jumps
 _STILL = 1e-9  # m/s; added to sums of speeds, so that no time is infinite
-_ROUND = 1e-3  # m/s^2: rounds the corner of max(u, 0)
 _TINY = 1e-12  # under roots of sums of squares that may vanish
-_FIXED = 16  # shared numbers before the rows of rates
+_FIXED = 16  # shared numbers before the rows of rates, of cones and of planes
 
 
 @dataclass(frozen=True)
 class Kind:
     """Which rows there are: whether the heading is ``free``; of each rate whether it is the
-    ``norms`` of two components, and whether its change is bounded (``changes``); ``steers``."""
+    ``norms`` of two components, and whether its change is bounded (``changes``); how many
+    ``cones`` and ``planes``, in how many ``powers`` of curvature; ``steers``."""
 
     free: bool
     norms: tuple[bool, ...]
     changes: tuple[bool, ...]
+    cones: int
+    planes: int
+    powers: int
     steers: bool
 
     @property
@@ -43,16 +47,18 @@ def kind_of(envelope: Envelope) -> Kind:
     """The kind of rows that an envelope has."""
     norms = tuple(bool(row.any()) for row in envelope.second)
     changes = tuple(bool(c > 0) for c in envelope.changes)
-    return Kind(envelope.free, norms, changes, bool(np.isfinite(envelope.turning)))
+    cones, powers = envelope.cones.shape[:2]
+    steers = bool(np.isfinite(envelope.turning))
+    return Kind(envelope.free, norms, changes, cones, len(envelope.planes), powers, steers)
 
 
 def shared_numbers(envelope: Envelope, kind: Kind, cost: list[float]) -> Array:
     """What all cells share: weights of time, length, bend and evenness, mean |q'|, then limits."""
     e = envelope
-    inverse = [1 / v for v in (*e.ellipse, *e.box, e.curvature)]
-    rest = [e.base, 1 / e.turning if kind.steers else 0.0, e.length, *e.cog]
-    fixed = [*cost, *inverse, *rest]
-    return np.concatenate([fixed, e.first.ravel(), e.second.ravel(), e.changes])
+    inverse = [1 / v for v in (*e.box, e.curvature)]
+    rest = [e.base, 1 / e.turning if kind.steers else 0.0, e.length, *e.cog, *e.down]
+    rows = [e.first, e.second, e.changes, e.cones, e.planes]
+    return np.concatenate([cost, inverse, rest, *(part.ravel() for part in rows)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +72,9 @@ class Symbols:
     rows: int
     bounds: tuple[Array, Array]
     node_rows: IndexArray  # of a cell's weights, those that the discs need
-    value: Any
+    cost: Any
+    rows_of: Any
+    gradient: Any
     slopes: Any
     bends: Any
     spots: Any
@@ -103,7 +111,8 @@ def symbols_of(kind: Kind, discs: int) -> Symbols:
     axes, rates = kind.axes, len(kind.norms)
     points = 4 * axes
     z, w = ca.SX.sym("z", points + 2), ca.SX.sym("w", 28)
-    shared = ca.SX.sym("s", _FIXED + 7 * rates)
+    forces = kind.powers * (16 * kind.cones + 4 * kind.planes)
+    shared = ca.SX.sym("s", _FIXED + 7 * rates + forces)
     cost, rows, low, high = _cell(ca, kind, z, w, shared)
     sigma, lam = ca.SX.sym("sigma"), ca.SX.sym("lam", rows.numel())
     gradient, slopes = ca.densify(ca.gradient(cost, z)), ca.jacobian(rows, z)
@@ -127,8 +136,10 @@ def symbols_of(kind: Kind, discs: int) -> Symbols:
         rows.numel(),
         (low, high),
         np.array([*range(12, 20)]),
-        ca.Function("value", inputs, [cost, rows]),
-        ca.Function("slopes", inputs, [gradient, slopes]),
+        ca.Function("cost", inputs, [cost]),
+        ca.Function("rows", inputs, [rows]),
+        ca.Function("gradient", inputs, [gradient]),
+        ca.Function("slopes", inputs, [slopes]),
         ca.Function("bends", [*inputs, sigma, lam], [bends]),
         ca.Function("spots", [at, wn, centres], [spots]),
         ca.Function("disc_slopes", [at, wn, centres, d[0], d[1]], [disc_slopes]),
@@ -148,7 +159,7 @@ def _places(matrix: Any) -> tuple[IndexArray, IndexArray]:
 def _cell(ca: Any, kind: Kind, z: Any, w: Any, shared: Any) -> tuple[Any, Any, Array, Array]:
     """Cost, rows, and the rows' bounds."""
     axes, rates = kind.axes, len(kind.norms)
-    length = shared[13]
+    length = shared[10]
     control = ca.reshape(z[: 4 * axes], axes, 4)
     va, vb = z[4 * axes], z[4 * axes + 1]
     q = [control @ w[4 * k : 4 * k + 4] for k in range(7)]
@@ -168,21 +179,19 @@ def _cell(ca: Any, kind: Kind, z: Any, w: Any, shared: Any) -> tuple[Any, Any, A
         low.append(least)
         high.append(most)
 
-    turning = (right.twist[2] * vb - left.twist[2] * va) * (va + vb) / (2 * ds)
+    mean = (va + vb) / (2 * ds)  # of change over a cell to change in time
+    turning = (right.twist[2] * vb - left.twist[2] * va) * mean
     for end, v in ((left, va), (right, vb)):
-        along, across = end.acceleration(u, v)
-        square = (end.twist[2] * v) ** 2  # at the centre of gravity, not at the origin
-        ahead = along - turning * shared[15] - square * shared[14]
-        beside = across + turning * shared[14] - square * shared[15]
-        half = ca.sqrt(ahead**2 + _ROUND**2)
-        grip = ((ahead + half) / 2 * shared[5]) ** 2 + ((half - ahead) / 2 * shared[6]) ** 2
-        keep(grip + (beside * shared[7]) ** 2, -np.inf, 1.0)
-    keep(u * shared[8], -np.inf, 1.0)
-    keep(u * shared[9], -1.0, np.inf)
+        _keep_forces(ca, kind, end, shared, (u, v, turning), keep)
+    if kind.free:
+        speeds = [ca.sqrt(e.twist[0] ** 2 + e.twist[1] ** 2 + _TINY) for e in (left, right)]
+        u = (speeds[1] * vb - speeds[0] * va) * mean
+    keep(u * shared[5], -np.inf, 1.0)
+    keep(u * shared[6], -1.0, np.inf)
     keep(right.rate / shared[4], SLOWEST, FASTEST)
     if not kind.free:
-        keep(left.bend * shared[10], -1.0, 1.0)
-        keep(right.bend * shared[10], -1.0, 1.0)
+        keep(left.bend * shared[7], -1.0, 1.0)
+        keep(right.bend * shared[7], -1.0, 1.0)
     first = ca.reshape(shared[_FIXED : _FIXED + 3 * rates], 3, rates)
     second = ca.reshape(shared[_FIXED + 3 * rates : _FIXED + 6 * rates], 3, rates)
     for k, norm in enumerate(kind.norms):
@@ -194,12 +203,39 @@ def _cell(ca: Any, kind: Kind, z: Any, w: Any, shared: Any) -> tuple[Any, Any, A
         keep(*(((a**2 + b**2) * v**2, -np.inf, 1.0) if norm else (a * v, -1.0, 1.0)))
         if kind.changes[k]:
             size = [ca.sqrt(a**2 + b**2 + _TINY) * v if norm else a * v for a, b, v in ends]
-            change = (size[1] - size[0]) * (va + vb) / (2 * ds)
+            change = (size[1] - size[0]) * mean
             keep(change * shared[_FIXED + 6 * rates + k], -1.0, 1.0)
     if kind.steers:
-        angle = [ca.atan(shared[11] * end.bend) for end in (left, right)]
-        keep((angle[1] - angle[0]) * (va + vb) / (2 * ds) * shared[12], -1.0, 1.0)
+        angle = [ca.atan(shared[8] * end.bend) for end in (left, right)]
+        keep((angle[1] - angle[0]) * mean * shared[9], -1.0, 1.0)
     return cost, ca.vertcat(*rows), np.array(low), np.array(high)
+
+
+def _keep_forces(
+    ca: Any, kind: Kind, end: _End, shared: Any, motion: tuple[Any, Any, Any], keep: Any
+) -> None:
+    """Rows of cones and planes at one end, with s'', s' and the yaw acceleration there."""
+    u, v, turning = motion
+    along, across = end.acceleration(u, v)
+    square = (end.twist[2] * v) ** 2  # at the centre of gravity, not at the origin
+    x, y, z = (shared[k] for k in (13, 14, 15))
+    w = ca.vertcat(
+        along - square * shared[11] - STANDARD_GRAVITY * (end.cos * x + end.sin * y),
+        across - square * shared[12] - STANDARD_GRAVITY * (end.cos * y - end.sin * x),
+        turning,
+        z,
+    )
+    at = _FIXED + 7 * len(kind.norms)
+    for rows, count in ((4, kind.cones), (1, kind.planes)):
+        for _ in range(count):
+            value: Any = 0
+            for power in range(kind.powers):
+                matrix = ca.reshape(shared[at : at + 4 * rows], 4, rows).T
+                value, at = value + end.bend**power * (matrix @ w), at + 4 * rows
+            if rows == 4:
+                keep(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 - value[3] ** 2, -np.inf, 0.0)
+            else:
+                keep(value, 0.0, np.inf)
 
 
 def _rate(ca: Any, kind: Kind, d1: Any, length: Any) -> Any:

@@ -11,7 +11,7 @@ import shapely
 
 from trajopt.arrays import Array
 
-GAP = 1 / 15  # of the largest disc: what discs may leave of the outline; chosen, 2 cm of 0.3 m
+GAP = 1 / 8  # of the largest disc: what discs may leave of the outline; chosen, 4 cm of 0.3 m
 _STEP = 0.25  # of the gap, between places of the outline that discs must reach; chosen
 _CLOSE = 1e-4  # of the longer side: how near the largest disc is to the largest there is; chosen
 _SIDE = 40  # places along the longer side where discs may have their centres; chosen

@@ -13,9 +13,11 @@ from trajopt.routes.field import Field
 
 
 class HasField(Protocol):
-    """What holds the field of the scene that is solved in."""
+    """What holds the field of the scene that is solved in, and what was last ``seen`` of it: places
+    (M, 2) and what is there (6, M)."""
 
     field: Field | None
+    seen: tuple[Array, Array] | None
 
 
 def cell_weights(points: int) -> Array:
@@ -59,6 +61,9 @@ def field_call(ca: Any, holder: HasField, count: int) -> Any:
 
         def eval(self, arguments: Any) -> list[Any]:
             assert holder.field is not None
-            return [holder.field.smooth(np.asarray(arguments[0]).T)]
+            places = np.asarray(arguments[0]).T
+            if holder.seen is None or not np.array_equal(holder.seen[0], places):
+                holder.seen = places.copy(), holder.field.smooth(places)
+            return [holder.seen[1]]
 
     return FieldCall()

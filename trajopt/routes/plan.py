@@ -8,6 +8,7 @@ said of a route is recomputed, and the better of both stages' and the program's 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -24,12 +25,12 @@ from trajopt.routes.cells import CELLS, kind_of
 from trajopt.routes.cover import Cover, cover
 from trajopt.routes.envelope import Envelope, envelope_of
 from trajopt.routes.field import Field, field_of
-from trajopt.routes.program import Program, Solved, Weights, program_of
+from trajopt.routes.program import Solved, Weights, program_of
 from trajopt.routes.proof import why_none
 from trajopt.routes.ways import Way, ways
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.trajectory import Trajectory
-from trajopt.world.clearance import Clearance, path_clearance
+from trajopt.world.clearance import Clearance, outline_distances, path_clearance
 from trajopt.world.crossing import outlines_at
 from trajopt.world.scene import Scene
 
@@ -42,10 +43,15 @@ CLOSE = 1.06  # times the least duration of two stages: slower ways are not trie
 _SPACING = 0.8  # of the outline's longer side, between control points; chosen
 _FEWEST, _MOST, _STEP = 10, 64, 6  # control points, and the step between numbers of them
 LONGER = 1.15  # times the shortest way: longer ones are not made smooth
-_LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; added to what lacks
+_LEAST, _MORE = 0.002, 0.003  # m that discs keep beyond the clearance; more of it where it lacks
+_ROOMY = 0.8  # of the room beside a disc: what discs may keep when a path is known; chosen
 _TIGHT = 0.5  # of the room beside a disc in the narrowest place: what discs may keep there
+_TRUST = 0.25  # of what discs leave of the outline, kept from the start; chosen: seldom too little
 _ROUNDED = 1.8  # times that room: spacing of a field whose spline does not round a ridge off
-_TRIES = 4  # times that more room is given
+_TRIES = 6  # times that more room is given
+_BESIDE = (
+    3  # nodes on either side that get more room too: a corner slides along the outline; chosen
+)
 _HELD = 0.95  # of the speeds of two stages that a program starts from
 _EXACT = 1e-6  # m of clearance that is rounding
 
@@ -53,7 +59,7 @@ _EXACT = 1e-6  # m of clearance that is rounding
 @dataclass(frozen=True, eq=False)
 class Attempt:
     """One way, as far as it got: the ``path``, its ``trajectory`` and ``clearance``; why it ended
-    where there is none."""
+    where there is none. ``seconds`` of processor time after the search began it was there."""
 
     way: Way
     method: Method
@@ -61,6 +67,7 @@ class Attempt:
     clearance: Clearance | None = None
     trajectory: Trajectory | None = None
     why: str = ""
+    seconds: float = 0.0
 
     def cost(self, aim: Aim) -> float:
         """Duration (s) or length (m); inf where it did not get there."""
@@ -120,6 +127,7 @@ def plan_route(
     Finding none is an answer, not an error. Raises InfeasibleError where the limits allow no motion
     at all.
     """
+    started = time.process_time()
     free = robot.holonomic if free is None else free
     ends = (np.array(start, dtype=np.float64), np.array(goal, dtype=np.float64))
     discs = cover(tuple(robot.footprint))
@@ -137,13 +145,16 @@ def plan_route(
         aim,
         free,
         discs,
-        envelope_of(robot, limits, free),
+        envelope_of(robot, limits, free, scene.ground),
         dict(timing or {}),
     )
     field = field_of(scene, np.array([ends[0][:2], ends[1][:2]]))
     inner = discs.inner[2] + clearance
     found = ways(field, ends[0][:2], ends[1][:2], inner, 2 * inner, MOST_WAYS)
-    attempts = list(_attempts(job, field, found))
+    attempts = [
+        replace(attempt, seconds=time.process_time() - started)
+        for attempt in _attempts(job, field, found)
+    ]
     best = min(attempts, key=lambda a: a.cost(aim), default=None)
     if best is not None and best.trajectory is not None:
         return Route(tuple(attempts), best)
@@ -169,69 +180,82 @@ def _told(near: float) -> str:
 
 def _attempts(job: _Job, field: Field, found: Sequence[Way]) -> Iterator[Attempt]:
     """Two stages for every way; then, for least time, one program from the better ones."""
-    firsts: list[tuple[Attempt, Solved, tuple[Field, float], Program]] = []
+    firsts: list[tuple[Attempt, Solved, Field, Array]] = []
     for way in found:
         if way.length > LONGER * found[0].length and firsts:
             continue
-        near = _near(job, field, way)
-        program = _program(job, way)
-        start = _guess(job, way, program)
-        attempt, solved = _free(job, near, program, way, start, "two stages")
+        near, room = _near(job, field, way)
+        guess = _guess(job, way)
+        rooms = np.full(len(guess.speeds) - 2, job.clearance + room)
+        attempt, solved = _free(job, near, rooms, way, guess, "two stages")
         yield attempt
-        firsts.append((attempt, solved, near, program))
+        firsts.append((attempt, solved, near, rooms))
     if job.aim != "duration":
         return
     least = min((first[0].cost("duration") for first in firsts), default=np.inf)
-    for attempt, solved, near, program in firsts:
+    for attempt, solved, near, rooms in firsts:
         if attempt.trajectory is None or attempt.cost("duration") > CLOSE * least:
             continue
-        start = replace(solved, speeds=_HELD * _speeds(attempt.trajectory, program))
-        yield _free(job, near, program, attempt.way, start, "one program")[0]
+        start = replace(solved, speeds=_HELD * _speeds(attempt.trajectory, len(solved.speeds)))
+        yield _free(job, near, rooms, attempt.way, start, "one program")[0]
 
 
-def _program(job: _Job, way: Way) -> Program:
+def _guess(job: _Job, way: Way) -> Solved:
     side = float(np.ptp(np.array(job.robot.footprint), axis=0).max())
-    count = int(np.ceil((way.length / (_SPACING * side) - _FEWEST + 3) / _STEP))
-    points = int(np.clip(_FEWEST + _STEP * count, _FEWEST, _MOST))
-    return program_of(kind_of(job.envelope), points, len(job.discs.radii))
+    steps = int(np.ceil((way.length / (_SPACING * side) - _FEWEST + 3) / _STEP))
+    count = int(np.clip(_FEWEST + _STEP * steps, _FEWEST, _MOST))
+    points = fitted(way.points, count, job.ends, job.free)
+    return Solved(points, np.zeros(CELLS * (count - 3) + 1))
 
 
-def _guess(job: _Job, way: Way, program: Program) -> Solved:
-    points = fitted(way.points, program.points, job.ends, job.free)
-    return Solved(points, np.zeros(program.cells + 1))
-
-
-def _speeds(trajectory: Trajectory, program: Program) -> Array:
-    """(N+1,): s' at the nodes."""
-    u = np.arange(program.cells + 1) / CELLS
+def _speeds(trajectory: Trajectory, nodes: int) -> Array:
+    """(nodes,): s' at the nodes of a program."""
+    u = np.arange(nodes) / CELLS
     squares = np.interp(trajectory.path.parameter(u), trajectory.s, trajectory.sd**2)
     return np.sqrt(squares)
 
 
 def _free(
-    job: _Job,
-    near: tuple[Field, float],
-    program: Program,
-    way: Way,
-    start: Solved,
-    method: Method,
+    job: _Job, near: Field, rooms: Array, way: Way, start: Solved, method: Method
 ) -> tuple[Attempt, Solved]:
-    """The program's path with as much room as the outline itself needs, and its timing."""
-    weights = Weights(1.0) if method == "one program" else Weights(0.0, 1.0, BEND)
-    field, extra = near
-    room = job.clearance + extra
-    attempt, solved = Attempt(way, method), start
+    """The program's path and its timing. ``rooms`` (N-1,), m, of discs at the inner nodes become
+    what the outline needs there."""
+    whole = method == "one program"
+    weights = Weights(1.0) if whole else Weights(0.0, 1.0, BEND)
+    envelope = job.envelope if whole else job.envelope.bare
+    program = program_of(kind_of(envelope), len(start.points), len(job.discs.radii))
+    attempt, solved, goal = Attempt(way, method), start, job.clearance - _EXACT
+    more = np.zeros(len(rooms))
     for _ in range(_TRIES):
-        solved = program.solve(solved, job.ends, job.envelope, job.discs, field, weights, room)
+        solved = program.solve(solved, job.ends, envelope, job.discs, near, weights, rooms)
         path = as_path(solved.points, job.robot.turning_length)
-        found = path_clearance(
-            path, job.robot.footprint, job.scene.keep_out, enough=job.clearance - _EXACT
-        )
-        if found.bound >= job.clearance - _EXACT:
+        found = path_clearance(path, job.robot.footprint, job.scene.keep_out, enough=goal)
+        if found.bound >= goal:
             return _timed(job, replace(attempt, path=path, clearance=found)), solved
         attempt = replace(attempt, why=f"{found}; IPOPT: {solved.status}")
-        room += job.clearance - found.distance + _MORE
+        rooms[:] = _rooms(job, near, path, found, more)
     return attempt, solved
+
+
+def _rooms(job: _Job, near: Field, path: Path, found: Clearance, more: Array) -> Array:
+    """(N-1,): what discs have to keep at the inner nodes so that the outline keeps the clearance: by
+    as much more as they are farther off than it here, as far as there is room; and ``more``, which
+    grows where it lacks."""
+    from scipy.ndimage import maximum_filter1d
+
+    u = np.arange(1, len(more) + 1) / CELLS
+    places, yaw = path.position(u)[:, :2], path.yaw(u)
+    centres = outlines_at(places, yaw, job.discs.centres)
+    discs = near.smooth(centres.reshape(-1, 2))[0].reshape(len(u), -1) - job.discs.radii
+    own = outline_distances(path, u, job.robot.footprint, job.scene.keep_out)[0]
+    lacks = job.clearance - own
+    worst = np.argmin(np.abs(path.parameter(u) - found.s))
+    lacks[worst] = max(lacks[worst], job.clearance - found.distance)
+    more += np.where(maximum_filter1d(lacks, 2 * _BESIDE + 1) > 0, _MORE, 0.0)
+    excess = maximum_filter1d(discs.min(axis=1) - own, 2 * _BESIDE + 1)
+    slack = near.roomiest(places) - job.discs.inner[2] - job.clearance
+    most = np.clip(_ROOMY * slack, _LEAST, 2 * job.discs.gap)
+    return np.asarray(job.clearance + np.clip(excess, _LEAST, most) + more)
 
 
 def _near(job: _Job, field: Field, way: Way) -> tuple[Field, float]:
@@ -245,7 +269,7 @@ def _near(job: _Job, field: Field, way: Way) -> tuple[Field, float]:
         tight = way.points[_ROUNDED * slack < near.spacing]
         reach = 1.5 * float(np.hypot(*np.transpose(job.robot.footprint)).max())
         near = near.finer(job.scene, _ROUNDED * least, tight, reach)
-    return near, float(np.clip(_TIGHT * least, _LEAST, job.discs.gap))
+    return near, float(np.clip(_TIGHT * least, _LEAST, _TRUST * job.discs.gap))
 
 
 def _timed(job: _Job, attempt: Attempt) -> Attempt:

@@ -35,8 +35,11 @@ from trajopt.routes.envelope import Envelope
 from trajopt.routes.field import Field
 from trajopt.routes.mapping import cell_weights, field_call, summing
 
-_EVEN = 1e-2  # of the cost: weight of the mean square of |q'| less its mean, relative; chosen
+_EVEN = 2e-3  # of the cost: weight of the mean square of |q'| less its mean, relative; chosen
 _CRAWL = 1e-3  # m/s, everywhere where speeds are left out
+# Every row that does not bind costs as much as the barrier's last parameter: with thousands of them
+# a tolerance of 1e-4 loses 1 % of time. So it is small, and what ends a search is that nothing is
+# gained.
 _SETTINGS = {
     **QUIET,
     "calc_lam_p": False,
@@ -44,11 +47,15 @@ _SETTINGS = {
     "no_nlp_grad": True,
     "ipopt.mu_init": 1e-2,
     "ipopt.max_iter": 150,
-    "ipopt.tol": 1e-4,
-    "ipopt.acceptable_tol": 1e-3,
-    "ipopt.acceptable_iter": 5,
+    "ipopt.tol": 1e-6,
+    "ipopt.acceptable_tol": 1e-2,
+    "ipopt.acceptable_constr_viol_tol": 1e-5,
+    "ipopt.acceptable_compl_inf_tol": 2e-6,
+    "ipopt.acceptable_obj_change_tol": 1e-4,
+    "ipopt.acceptable_iter": 3,
     "ipopt.bound_relax_factor": 0.0,
 }
+_ROUGH = {"ipopt.tol": 1e-4, "ipopt.acceptable_compl_inf_tol": 1e-4}  # without speeds: a start
 
 
 @dataclass(frozen=True)
@@ -87,6 +94,7 @@ class Program:
         self.cells = CELLS * (points - 3)
         self.symbols = symbols_of(kind, discs)
         self.field: Field | None = None
+        self.seen: tuple[Array, Array] | None = None
         axes, first = kind.axes, np.arange(self.cells) // CELLS
         near = (first[:, None] + np.arange(4))[:, :, None] * axes + np.arange(axes)
         speeds = points * axes + np.arange(self.cells)[:, None] + np.arange(2)
@@ -103,11 +111,12 @@ class Program:
         cover: Cover,
         field: Field,
         weights: Weights,
-        room: float,
+        room: Array,
     ) -> Solved:
-        """From ``start`` to a local optimum between two poses (3,); discs keep ``room`` (m)."""
+        """From ``start`` to a local optimum between two poses (3,); at the inner nodes discs keep
+        ``room`` (N-1,), m."""
         axes, count = self.kind.axes, self.points
-        self.field = field
+        self.field, self.seen = field, None
         mean = float(np.linalg.norm(np.diff(start.points[:, :2], axis=0), axis=1).mean())
         lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         for at, pose in ((0, ends[0]), (count - 1, ends[1])):
@@ -131,7 +140,8 @@ class Program:
         )
         shared = shared_numbers(envelope, self.kind, [*cost, scale / self.cells, mean])
         directions = [f(pose[2]) for pose in ends for f in (np.cos, np.sin)]
-        parameters = np.concatenate([shared, cover.centres.ravel(), cover.radii + room, directions])
+        radii = (room[:, None] + cover.radii).ravel()
+        parameters = np.concatenate([shared, cover.centres.ravel(), radii, directions])
         low, high = self._bounds(mean)
         found = self.solver(
             x0=np.concatenate([start.points.ravel(), speeds]),
@@ -170,7 +180,7 @@ class Program:
         ca = casadi()
         s, n, discs = self.symbols, self.cells, self.discs
         x = ca.MX.sym("x", self.size)
-        count = [s.shared, 2 * discs, discs, 4]
+        count = [s.shared, 2 * discs, discs * (n - 1), 4]
         p = ca.MX.sym("p", sum(count))
         shared, centres, radii, directions = ca.vertsplit(p, np.cumsum([0, *count]).tolist())
         local = ca.reshape(x[self.places.ravel().tolist()], s.locals, n)
@@ -183,24 +193,23 @@ class Program:
         seen = self._call(ca.reshape(spots, 2, discs * (n - 1)))
         d = [ca.reshape(seen[k, :], discs, n - 1) for k in range(6)]
         inputs = (local, weights, ca.repmat(shared, 1, n))
-        cost, rows = s.value.map(n)(*inputs)
+        rows = s.rows_of.map(n)(*inputs)
         ends, end_slopes, end_places = self._ends(ca, x, directions)
         g = ca.vertcat(
             ca.vec(rows),
-            ca.vec(d[0] - ca.repmat(radii, 1, n - 1)),
+            ca.vec(d[0]) - radii,
             *([] if ends is None else [ends]),
         )
-        f = ca.sum2(cost)
-        gradient, jacobian = s.slopes.map(n)(*inputs)
+        f = ca.sum2(s.cost.map(n)(*inputs))
+        gradient, jacobian = s.gradient.map(n)(*inputs), s.slopes.map(n)(*inputs)
         disc = s.disc_slopes.map(n - 1)(at, node_weights, ca.repmat(centres, 1, n - 1), d[1], d[2])
-        row, column, values = self._jacobian_places(s, end_places)
+        row, column = self._jacobian_places(s, end_places)
         vector = ca.vertcat(jacobian.nz[:], disc.nz[:], *([] if ends is None else [end_slopes]))
         order = np.lexsort((row, column))
         pattern = ca.Sparsity.triplet(
             g.numel(), self.size, row[order].tolist(), column[order].tolist()
         )
         jac = ca.MX(pattern, vector[order.tolist()])
-        del values
         summed = summing(ca, self.places.ravel(), self.size)
         grad = summed @ ca.vec(gradient)
         sigma, lam = ca.MX.sym("sigma"), ca.MX.sym("lam", g.numel())
@@ -228,8 +237,12 @@ class Program:
                 ["triu_hess_gamma_x_x"],
             ),
         }
+        rough = not (self.kind.norms or self.kind.cones or self.kind.planes)
         return ca.nlpsol(
-            "route", "ipopt", {"x": x, "p": p, "f": f, "g": g}, {**_SETTINGS, **functions}
+            "route",
+            "ipopt",
+            {"x": x, "p": p, "f": f, "g": g},
+            {**_SETTINGS, **(_ROUGH if rough else {}), **functions},
         )
 
     def _ends(self, ca: Any, x: Any, directions: Any) -> tuple[Any, Any, list[tuple[int, int]]]:
@@ -249,7 +262,7 @@ class Program:
 
     def _jacobian_places(
         self, s: Symbols, ends: Sequence[tuple[int, int]]
-    ) -> tuple[IndexArray, IndexArray, int]:
+    ) -> tuple[IndexArray, IndexArray]:
         """Row and column of every value of the Jacobian, as they come."""
         n, discs = self.cells, self.discs
         i, j = s.slope_places
@@ -261,7 +274,7 @@ class Program:
         first = s.rows * n + discs * (n - 1)
         for r, c in ends:
             row, column = np.append(row, first + r), np.append(column, c)
-        return row, column, len(row)
+        return row, column
 
     def _hessian(self, ca: Any, s: Symbols, values: Any) -> Any:
         """Upper half of the Hessian, values that meet in a place summed."""

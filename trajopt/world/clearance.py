@@ -66,7 +66,7 @@ def path_clearance(
     knots = np.asarray(path.basis.knots)
     share = np.arange(_FIRST) / _FIRST
     u = np.append((knots[:-1, None] + np.diff(knots)[:, None] * share).ravel(), knots[-1])
-    d, which = _distances(path, u, footprint, keep_out)
+    d, which = outline_distances(path, u, footprint, keep_out)
     for _ in range(_MOST_ROUNDS):
         travel = path.swept(u[:-1], u[1:], reach)
         bound = (d[:-1] + d[1:] - travel) / 2
@@ -76,7 +76,7 @@ def path_clearance(
         if not (d.min() > 0 and open_.any()) or len(u) > _MOST_PLACES:
             break
         fresh = middle[open_]
-        more, what = _distances(path, fresh, footprint, keep_out)
+        more, what = outline_distances(path, fresh, footprint, keep_out)
         order = np.argsort(np.concatenate([u, fresh]), kind="stable")
         u, d = np.concatenate([u, fresh])[order], np.concatenate([d, more])[order]
         which = np.concatenate([which, what])[order]
@@ -91,7 +91,7 @@ def path_clearance(
     )
 
 
-def _distances(
+def outline_distances(
     path: Path, u: Array, footprint: Sequence[tuple[float, float]], keep_out: KeepOut
 ) -> tuple[Array, IndexArray]:
     """Distances at spline parameters (N,), minus the depth where interiors meet; nearest solids."""

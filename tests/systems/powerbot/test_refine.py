@@ -1,4 +1,4 @@
-"""Jerk-limited motions, path and timing together, following a profile."""
+"""Jerk-limited motions, following a profile."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from trajopt.limits.speed_bound import SpeedProfile
 from trajopt.limits.tip import Tip
 from trajopt.paths.path import Path
 from trajopt.refine.jerk import limit_jerk
-from trajopt.refine.path import corridor, optimize_path
 from trajopt.refine.profile import follow
 from trajopt.report.motion import table_times
 from trajopt.robots.robot import robot as shipped
@@ -145,24 +144,6 @@ def test_jerk_limit_over_a_ramp_keeps_every_row() -> None:
         (motion.v, motion.a[:-1], motion.jerk * steps / 2),
     ):
         np.testing.assert_allclose(np.diff(values), steps * (rates + then), atol=1e-6)
-
-
-def test_joint_program_finds_the_straight_line() -> None:
-    """Knots pulled aside, corridor wide enough: the straight line is the optimum, and known."""
-    path = Path.through([[0, 0], [1.5, 0.3], [3, -0.25], [4.5, 0]], knots=[0, 1, 2, 3])
-    found = optimize_path(corridor(path), [(-0.5, 0.5)] * 2, LIMITS)
-    best = 4.5 + 1.0 / 0.5
-    assert found.two_stage_duration > best + 0.05
-    assert found.trajectory.duration == pytest.approx(best, rel=2e-3)
-    assert list(found.history) == sorted(found.history, reverse=True)
-
-
-def test_joint_program_stays_in_its_corridor() -> None:
-    path = Path.through([[0, 0], [1.5, 0.8], [3, 0]], knots=[0, 1, 2])
-    found = optimize_path(corridor(path), [(-0.2, 0.2)], LIMITS, steps=6)
-    assert abs(found.variables[0]) <= 0.2
-    assert found.gain > 0
-    assert min(found.trajectory.margins().values()) >= -1e-9
 
 
 def test_following_what_is_feasible_is_exact() -> None:
