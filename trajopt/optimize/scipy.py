@@ -25,7 +25,7 @@ _FAR = 1e10  # by which constraints count as broken where they could not be comp
 _FLAT = 1e-6  # slope, a width of the bounds and a unit of cost, that counts as none; chosen
 _NEAR = 1e-7  # by which a constraint may be missed and still holds a search back, chosen
 # Iterations from one of many starts, chosen.
-_OF_MANY = {"SLSQP": 100, "trust-constr": 300, "COBYQA": 300}
+_OF_MANY = {"SLSQP": 100, "L-BFGS-B": 100, "trust-constr": 300, "COBYQA": 300, "Nelder-Mead": 300}
 _FIRST_STEP = 0.1  # of the width: first step of methods without derivatives, chosen
 
 Method = Literal["SLSQP", "L-BFGS-B", "trust-constr", "COBYQA", "Nelder-Mead"]
