@@ -181,10 +181,10 @@ def safe_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[
 
 
 def plan_beyond(name: str, place: str, friction: float) -> Trajectory:
-    """A motion planned with BEYOND of the friction that all wheels have together. Its top speed
-    follows the friction, so that it speeds up and brakes as long on all of them: the slip that is
-    measured is a mean over ``SLIP_TIME``."""
-    speed = SPEED * friction / FRICTIONS[0]
+    """A motion planned with BEYOND of the friction that all wheels have together. The square
+    of its top speed follows the friction, so that it speeds up and brakes over the same stretches on
+    all of them: at one speed it is so short that the mean over ``SLIP_TIME`` hides the slip."""
+    speed = SPEED * math.sqrt(friction / FRICTIONS[0])
     return plan(name, place, friction, BEYOND, "capacity", speed)
 
 
