@@ -1,26 +1,28 @@
 """Bring docs/pso_vs_gradient.md up to date with the rows of a benchmark.
 
-Run as ``python -m benchmarks.pso_vs_gradient_page [STORE]`` after ``trajopt bench
-benchmarks/pso_vs_gradient.toml`` and ``python -m benchmarks.peers.pso_statistics``. Replaces what stands between the markers of the page and of README (tables) and
+Run as ``python -m benchmarks.pso_vs_gradient_page [STORE ...]`` after ``trajopt bench
+benchmarks/pso_vs_gradient.toml`` and ``python -m benchmarks.peers.pso_statistics``. Replaces what stands between the markers of the page and of docs/compared.md (tables) and
 the page's three pictures; the words around them are written by hand, so read them again. The whole report
-(CSV, SVG, every table) goes to STORE/report.
+(every table) is ``trajopt bench report STORE``.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 
 from benchmarks.common import OUT, ROOT
 from trajopt.bench.answers import answer_lines, beaten_lines, budget_lines, part_lines
-from trajopt.bench.page import run_line, share_lines, write_report
+from trajopt.bench.page import run_line, share_lines
+from trajopt.bench.pictures import save_bench_pictures
 from trajopt.bench.tables import SOLVED, BenchTables
 from trajopt.report.files import markdown
 from trajopt.sweeps.store import open_store
 
-PAGE, README = ROOT / "docs" / "pso_vs_gradient.md", ROOT / "README.md"
+PAGE, COMPARED = ROOT / "docs" / "pso_vs_gradient.md", ROOT / "docs" / "compared.md"
 PICTURES = ("families", "ecdf", "profiles")
 COLOURS = 48  # of a picture, chosen
 
@@ -28,20 +30,27 @@ COLOURS = 48  # of a picture, chosen
 def main() -> None:
     """Rewrite the generated parts of the page."""
     parser = argparse.ArgumentParser(description="Generated parts of docs/pso_vs_gradient.md.")
-    parser.add_argument(
-        "store", nargs="?", type=Path, default=ROOT / "out" / "bench" / "pso_vs_gradient"
-    )
-    store = open_store(parser.parse_args().store, create=False)
-    report = store.path / "report"
-    write_report(store, report)
-    budgets = BenchTables.by_budget(store.frame().to_dict("records"))
+    usual = [ROOT / "out" / "bench" / "pso_vs_gradient"]
+    told = "rows of benchmarks; all seeds of a search in a later one take the place of those in the first"
+    parser.add_argument("stores", nargs="*", type=Path, default=usual, help=told)
+    stores = [open_store(path, create=False) for path in parser.parse_args().stores]
+    report = stores[0].path / "report"
+    report.mkdir(exist_ok=True)
+    searches: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for store in stores:
+        mine: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+        for row in store.frame().to_dict("records"):
+            key = tuple(str(row[name]) for name in ("problem", "optimizer", "budget"))
+            mine.setdefault(key, []).append(row)
+        searches |= mine
+    budgets = BenchTables.by_budget([row for rows in searches.values() for row in rows])
     tables = list(budgets.values())[-1]
     statistics = (OUT / "pso_statistics.md").read_text(encoding="utf-8")
     parts = {
-        "run": [run_line(store, budgets)],
+        "run": [run_line(stores[0], budgets)],
         "answers": answer_lines(tables),
         "budgets": budget_lines(budgets),
-        "parts": part_lines(tables),
+        "parts": part_lines(budgets),
         "shares": share_lines(tables, report),
         "peers": statistics.replace("## ", "### ").split("\n", 2)[2].splitlines(),
         "best": beaten_lines(tables)[:1],
@@ -50,16 +59,17 @@ def main() -> None:
     for name, lines in parts.items():
         text = replaced(text, name, "\n".join(lines))
     PAGE.write_text(text, encoding="utf-8")
-    told = [*readme_lines(tables, list(budgets)[-1]), "", parts["run"][0]]
-    readme = README.read_text(encoding="utf-8")
-    README.write_text(replaced(readme, "optimizers", "\n".join(told)), encoding="utf-8")
+    short = [*short_lines(tables, list(budgets)[-1]), "", parts["run"][0]]
+    text = COMPARED.read_text(encoding="utf-8")
+    COMPARED.write_text(replaced(text, "optimizers", "\n".join(short)), encoding="utf-8")
+    save_bench_pictures(tables, report)
     for name in PICTURES:
         small_picture(
             report / f"{name}.png", PAGE.parent / "pictures" / f"pso_vs_gradient_{name}.png"
         )
 
 
-def readme_lines(tables: BenchTables, budget: str) -> list[str]:
+def short_lines(tables: BenchTables, budget: str) -> list[str]:
     """How each optimizer does on the searches of the double wheel, by family."""
     shares = {name: found for name, found in tables.shares().items() if "newton" in found}
     shares = {name: found for name, found in shares.items() if "SMDW" in name}

@@ -1,9 +1,8 @@
 """Tables of docs/compared.md and docs/climbing.md from the last benchmark runs: `python -m
 benchmarks.readme_tables`.
 
-Run first: `python -m benchmarks.optimizers`, `python -m benchmarks.peers.time_scaling`, `python -m
-benchmarks.peers.swarm_speed`, `python -m benchmarks.theses.climb` with both engines, `python -m
-benchmarks.theses.closed_loop`. The tables stand between markers.
+Run first: `python -m benchmarks.peers.time_scaling`, `python -m benchmarks.peers.swarm_speed`, `python
+-m benchmarks.theses.climb` with both engines, `python -m benchmarks.theses.closed_loop`. The tables stand between markers.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from benchmarks.theses.closed_loop import SETTINGS
 from trajopt.report.intervals import wilson
 
 DOCS, RESULTS = Path("docs"), Path("out/benchmarks")
-COMPARED, CLIMBING, WHOLE = DOCS / "compared.md", DOCS / "climbing.md", DOCS / "optimizers.md"
+COMPARED, CLIMBING = DOCS / "compared.md", DOCS / "climbing.md"
 START, END = "<!-- tables: python -m benchmarks.readme_tables -->", "<!-- end of tables -->"
 CLIMBS, END_OF_CLIMBS = (
     "<!-- climbs: python -m benchmarks.readme_tables -->",
@@ -82,52 +81,6 @@ def _row(work: str, ours: float, peer: str, theirs: float, unit: str) -> str:
     return f"| {work} | {ours:.3g} {unit} | {peer}: {theirs:.3g} {unit} | {theirs / ours:.3g} |"
 
 
-def optimizers() -> list[str]:
-    """Every optimizer on every problem: median and worst cost, and the whole table folded away."""
-    frame = pd.read_csv(RESULTS / "optimizers.csv")
-    lines: list[str] = []
-    for title in frame.dropna(subset=["optimizer"])["table"].unique():
-        part = frame[frame["table"] == title].dropna(subset=["optimizer"])
-        free = ", ".join(sorted(set(part["free"])))
-        lines += [
-            "",
-            f"**{title}** ({free} free, {part['problem'].nunique()} problems)",
-            "",
-            "| optimizer | problems <= 1e-7 | median cost | worst cost | median evaluations | median seconds |",
-            "|---|---|---|---|---|---|",
-        ]
-        for name, group in part.groupby("optimizer", sort=False):
-            cost, used = (
-                group["cost"],
-                f"{group['evaluations'].median():.0f} | {group['seconds'].median():.3f}",
-            )
-            lines.append(
-                f"| {name} | {(cost <= 1e-7).sum()} | {cost.median():.1e} | {cost.max():.1e} | {used} |"
-            )
-    whole = [
-        "# All optimizers on all problems",
-        "",
-        f"Measured {frame['run'].dropna().iloc[0]}.",
-        "",
-        "| actuators | problem | free | optimizer | cost | violation | evaluations | seconds |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for row in frame.dropna(subset=["optimizer"]).itertuples():
-        drives = "ideal" if "Without" in row.table else "limited"
-        figures = (
-            f"{row.cost:.1e} | {row.violation:.0e} | {row.evaluations:.0f} | {row.seconds:.3f}"
-        )
-        whole.append(f"| {drives} | {row.problem} | {row.free} | {row.optimizer} | {figures} |")
-    WHOLE.write_text("\n".join(whole) + "\n", encoding="utf-8")
-    run = frame["run"].dropna().iloc[0]
-    return [
-        *lines,
-        "",
-        f"Each search had 25,000 evaluations and 2 s. Measured {run}; a + after the commit means "
-        f"uncommitted changes. Every row: [optimizers]({WHOLE.name}).",
-    ]
-
-
 def climbs() -> list[str]:
     """Share of climbs by what planned the wheel angles, both engines side by side; final errors
     with feedback."""
@@ -177,7 +130,7 @@ def _share(up: pd.Series) -> str:
 def main() -> None:
     """Rewrite the tables of both pages."""
     for page, start, end, lines in (
-        (COMPARED, START, END, [*peers(), *optimizers()]),
+        (COMPARED, START, END, peers()),
         (CLIMBING, CLIMBS, END_OF_CLIMBS, climbs()),
     ):
         before, rest = page.read_text(encoding="utf-8").split(start)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from trajopt.bench.problems import bench_problem
 from trajopt.errors import ArgumentError
 from trajopt.optimize.base import Budget
 from trajopt.optimize.functions import FunctionObjective
@@ -42,6 +43,16 @@ def test_a_state_of_another_problem_is_refused(tmp_path: Path) -> None:
         minimize(square, BOX, optimizer="pso-gbest", state=file)
     with pytest.raises(ArgumentError, match="bounds"):
         minimize(square, [[-2.0, 3.0], [-1.5, 2.6]], optimizer="pso", state=file)
+
+
+def test_building_a_program_does_not_count() -> None:
+    """IPOPT's program of a terminal problem takes longer to write than this budget."""
+    objective = bench_problem("smdw/scenario_1_lateral/p1+p2+heading/limits").objective
+    budget = Budget(None, seconds=0.02, clock="cpu")
+    found = minimize(objective, objective.bounds, optimizer="ipopt", budget=budget)
+    assert found.construct_seconds > 0.02
+    assert found.nfev > 3
+    assert found.seconds < 0.06
 
 
 def test_exit_keeps_the_state(tmp_path: Path) -> None:

@@ -136,9 +136,15 @@ def budget_lines(budgets: Mapping[str, BenchTables]) -> list[str]:
     ]
 
 
-def part_lines(tables: BenchTables) -> list[str]:
+def part_lines(budgets: Mapping[str, BenchTables]) -> list[str]:
     """What each part of the exact methods does alone and with the others, beside methods that know
-    nothing of exactness."""
+    nothing of exactness: under the largest budget in evaluations and the largest one."""
+    counted = [text for text in budgets if not text.endswith(" s")]
+    names = dict.fromkeys([*counted[-1:], list(budgets)[-1]])
+    return "\n\n".join(f"**{n}.** " + "\n".join(_parts(budgets[n])) for n in names).splitlines()
+
+
+def _parts(tables: BenchTables) -> list[str]:
     shares = {f: found for f, found in tables.shares().items() if "newton" in found}
     names = [name for name in _PARTS if name in tables.optimizers]
     if not shares:

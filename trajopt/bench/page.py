@@ -32,7 +32,7 @@ def write_report(store: Store, out: Path) -> Path:
     sections = {
         "Answers": answer_lines(tables),
         "Several budgets": budget_lines(budgets),
-        "What exactness buys": part_lines(tables),
+        "What exactness buys": part_lines(budgets),
         "Share of searches solved": [*share_lines(tables, out), "", curves],
         **{title: [f"![{title}]({file})"] for title, (file, _) in figures.items()},
         "Expected running time": _running_table(tables, out),
@@ -70,7 +70,8 @@ def run_line(store: Store, budgets: Mapping[str, BenchTables]) -> str:
     spent = sum(
         float(row["seconds"]) + float(row["construct_seconds"]) / _BUILT_FOR for row in done
     )
-    planned = f" of {int(last['cases'])} planned" if "cases" in last else ""
+    most = int(last.get("cases", 0))
+    planned = f" of {most} planned" if most > len(done) else ""
     return (
         f"{len(done)} finished searches{planned}, {len(rows) - len(done)} others: "
         f"{len(one.problems)} problems, {len(one.optimizers)} optimizers, {one.seeds} seeds, budgets of "

@@ -131,17 +131,18 @@ class _Program:
                 written = _of_function(run, run.objective, start, float(here.cost[0]))
         tolerance = options.tolerance if written else max(options.tolerance, _BY_DIFFERENCES)
         ones = np.ones(self.slacks)
-        self.nlp = Nlp(
-            self.values,
-            self._watch,
-            np.concatenate([run.bounds[:, 0], 0.0 * ones]),
-            np.concatenate([run.width, ones]),
-            self.limits.shape[1],
-            written,
-            None if written else run.derivatives,
-            tolerance,
-            options.max_iterations,
-        )
+        with run.building():
+            self.nlp = Nlp(
+                self.values,
+                self._watch,
+                np.concatenate([run.bounds[:, 0], 0.0 * ones]),
+                np.concatenate([run.width, ones]),
+                self.limits.shape[1],
+                written,
+                None if written else run.derivatives,
+                tolerance,
+                options.max_iterations,
+            )
 
     def solve(self, start: Array) -> tuple[Array, dict[str, Any]]:
         """The decision variables (d,) where IPOPT ended from ``start`` (d,), and its account."""

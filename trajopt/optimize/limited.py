@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import NoReturn
 
@@ -41,6 +42,17 @@ class Limited(Record):
             self.construct_seconds += lost
             self._started += lost
             self._stage = evaluations, self._now()
+
+    @contextmanager
+    def building(self) -> Iterator[None]:
+        """Work inside the block that is no search (and asks the objective nothing) does not count."""
+        began = self._now()
+        try:
+            yield
+        finally:
+            lost = self._now() - began
+            self.construct_seconds += lost
+            self._started += lost
 
     def spend(self, evaluations: int) -> None:
         """Count work on the objective that does not go through ``evaluate`` (residuals), before it

@@ -81,6 +81,8 @@ def solve_residuals(
     x, norms = start.copy(), [np.inf] * 3
     for _ in range(iterations):
         r, jacobian = _linearised(run, coarse, x, turns, width)
+        if not np.isfinite(jacobian).all():
+            return NewtonOutcome(x, np.inf, False)
         norms.append(float(np.linalg.norm(r)))
         if _size(r, gains) < 1e-9:
             break
@@ -103,6 +105,8 @@ def _exactly(
     """Chord iterations on the residuals without grid error, with the search grid's Jacobian."""
     _, jacobian = _linearised(run, objective.coarse(), x, turns, width)
     best = _exact_residuals(run, objective, x, turns)
+    if not (np.isfinite(jacobian).all() and np.isfinite(best).all()):
+        return NewtonOutcome(x, np.inf, False)
     for _ in range(12):
         if _size(best, gains) < SOLVED:
             break
