@@ -51,6 +51,9 @@ HILLS, HILL = 0.3, 20.0
 # bear 2.5 % of the weight, and tyres that give let them bounce off the ground as braking begins
 LOAD = 0.2
 SAFE, BEYOND = 0.8, 1.2  # shares of the friction
+FAST = (
+    1.2  # m/s, beyond: at 1 m/s braking is so short that the mean over ``SLIP_TIME`` hides the slip
+)
 LEFT = "left physics"
 # Tall robots: centres of gravity raised until they tip before they slide. Springs are left out, for
 # on them a robot leans before it tips, which the limit does not know. Castors are blocked, for else PowerBot turns about its lower
@@ -90,7 +93,12 @@ def ground_of(name: str, place: str, friction: float) -> Ground:
 
 
 def plan(
-    name: str, place: str, friction: float, share: float, rule: Sharing | None = None
+    name: str,
+    place: str,
+    friction: float,
+    share: float,
+    rule: Sharing | None = None,
+    speed: float = SPEED,
 ) -> Trajectory:
     """A slight bend along the contour or, on the other grounds, between it and uphill; robots that
     can keep their heading. The slip limit has ``share`` of the friction, by the ``rule`` or, None,
@@ -102,7 +110,7 @@ def plan(
     path = Path.through(
         points @ np.array([[cos, sin], [-sin, cos]]), heading=[0.0, 0.0, 0.0] if keeps else None
     )
-    limits = (Speed(SPEED), Slip(share * friction, rule=rule), Tip(), Contact(LOAD))
+    limits = (Speed(speed), Slip(share * friction, rule=rule), Tip(), Contact(LOAD))
     return time_scale(path, limits, robot=machine, ground=ground_of(name, place, friction))
 
 
@@ -175,10 +183,15 @@ def safe_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[
             )  # fmt: skip
 
 
+def plan_beyond(name: str, place: str, friction: float) -> Trajectory:
+    """A motion planned with BEYOND of the friction that all wheels have together."""
+    return plan(name, place, friction, BEYOND, "capacity", FAST)
+
+
 def beyond_rows(names: Sequence[str], engines: Sequence[str], frictions: Sequence[float]) -> Rows:
-    """Motions planned with BEYOND of the friction that all wheels have together."""
+    """Motions of ``plan_beyond``."""
     for name, place, friction in product(names, GROUNDS, frictions):
-        trajectory = plan(name, place, friction, BEYOND, "capacity")
+        trajectory = plan_beyond(name, place, friction)
         for engine in engines:
             share, off = LEFT, ""
             try:

@@ -1,8 +1,9 @@
-"""Tables of README.md from the last benchmark runs: `python -m benchmarks.readme_tables`.
+"""Tables of docs/compared.md and docs/climbing.md from the last benchmark runs: `python -m
+benchmarks.readme_tables`.
 
 Run first: `python -m benchmarks.optimizers`, `python -m benchmarks.peers.time_scaling`, `python -m
 benchmarks.peers.swarm_speed`, `python -m benchmarks.theses.climb` with both engines, `python -m
-benchmarks.theses.closed_loop`. The tables stand between markers in README.md.
+benchmarks.theses.closed_loop`. The tables stand between markers.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from benchmarks.theses.climb_tables import THESIS
 from benchmarks.theses.closed_loop import SETTINGS
 from trajopt.report.intervals import wilson
 
-README, RESULTS, WHOLE = Path("README.md"), Path("out/benchmarks"), Path("docs/optimizers.md")
+DOCS, RESULTS = Path("docs"), Path("out/benchmarks")
+COMPARED, CLIMBING, WHOLE = DOCS / "compared.md", DOCS / "climbing.md", DOCS / "optimizers.md"
 START, END = "<!-- tables: python -m benchmarks.readme_tables -->", "<!-- end of tables -->"
 CLIMBS, END_OF_CLIMBS = (
     "<!-- climbs: python -m benchmarks.readme_tables -->",
@@ -122,7 +124,7 @@ def optimizers() -> list[str]:
         *lines,
         "",
         f"Each search had 25,000 evaluations and 2 s. Measured {run}; a + after the commit means "
-        f"uncommitted changes. Every row: [{WHOLE}]({WHOLE}).",
+        f"uncommitted changes. Every row: [optimizers]({WHOLE.name}).",
     ]
 
 
@@ -173,16 +175,15 @@ def _share(up: pd.Series) -> str:
 
 
 def main() -> None:
-    """Rewrite the tables in README.md."""
-    text = README.read_text(encoding="utf-8")
-    for start, end, lines in (
-        (START, END, [*peers(), *optimizers()]),
-        (CLIMBS, END_OF_CLIMBS, climbs()),
+    """Rewrite the tables of both pages."""
+    for page, start, end, lines in (
+        (COMPARED, START, END, [*peers(), *optimizers()]),
+        (CLIMBING, CLIMBS, END_OF_CLIMBS, climbs()),
     ):
-        before, rest = text.split(start)
+        before, rest = page.read_text(encoding="utf-8").split(start)
         text = "\n".join([before + start, "", *lines, end + rest.split(end)[1]])
-    README.write_text(text, encoding="utf-8")
-    print(f"wrote the tables of {README}")
+        page.write_text(text, encoding="utf-8")
+        print(f"wrote the tables of {page}")
 
 
 if __name__ == "__main__":

@@ -50,9 +50,9 @@ EVERY = "all"  # as a name in a dotted key: every element of an array of tables
 
 class Section(BaseModel):
     """A table of a file: frozen, finite numbers (of at most LARGEST in size where they are sizes),
-    no unknown keys."""
+    no unknown keys. Validators are built when first used: those of parts never are."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
     sizes: ClassVar[bool] = True
 
 

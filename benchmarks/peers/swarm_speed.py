@@ -19,6 +19,7 @@ import numpy as np
 from benchmarks.common import PROBLEMS, ResultTable, publish
 from trajopt.arrays import Array
 from trajopt.objectives.terminal import TerminalObjective, terminal_objective, with_free
+from trajopt.optimize import swarm
 from trajopt.optimize.base import Budget
 from trajopt.optimize.pso import ParticleSwarm
 from trajopt.optimize.search import minimize
@@ -119,7 +120,40 @@ def overhead(repeats: int) -> tuple[list[tuple[str, ...]], float]:
         rows.append(("pymoo", f"{other:.4f}", f"{other / ours:.1f}"))
     except ImportError:
         rows.append(("pymoo", "not installed", ""))
+    for topology in ("gbest", "ring"):
+        for kernel, told in ((_kernel, "numba loaded"), (lambda: None, "without numba")):
+            method = replace(own, topology=topology)
+            swarm._kernel = kernel  # type: ignore[assignment]
+            seconds = best_of(
+                lambda m=method: minimize(_sphere, box, optimizer=m, budget=Budget(n * iterations)),  # type: ignore[misc]
+                repeats,
+            )
+            plain = best_of(partial(_plain, topology == "ring"), repeats)
+            name = f"plain NumPy loop, {topology} / trajopt, {told}"
+            rows.append((name, f"{plain:.4f}", f"{plain / seconds:.2f}"))
+        swarm._kernel = _kernel
     return rows, peer / ours
+
+
+_kernel = swarm._kernel
+
+
+def _plain(ring: bool) -> float:
+    """The same swarm as few lines of NumPy, without bounds checks, history, budget or statuses."""
+    n, d, iterations = OVERHEAD
+    rng, i = np.random.default_rng(0), np.arange(n)
+    around = np.stack([(i - 1) % n, i, (i + 1) % n], axis=1)
+    x = rng.uniform(-5.0, 5.0, (n, d))
+    v, own, least = np.zeros((n, d)), x.copy(), np.full(n, np.inf)
+    for _ in range(iterations):
+        cost = _sphere(x)
+        better = cost < least
+        own[better], least[better] = x[better], cost[better]
+        best = own[around[i, least[around].argmin(axis=1)]] if ring else own[least.argmin()]
+        r, s = rng.random((2, n, d))
+        v = EQUAL["w"] * v + EQUAL["c1"] * r * (own - x) + EQUAL["c2"] * s * (best - x)
+        x = np.clip(x + v, -5.0, 5.0)
+    return float(least.min())
 
 
 def _sphere(x: Array) -> Array:

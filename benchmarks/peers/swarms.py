@@ -73,7 +73,7 @@ METHODS: tuple[Any, ...] = (
     "pso-ring",
     "auto",
     "cma-es",
-    Pymoo(particles=25),
+    Pymoo(),
     _Peer("scipy-de", _de),
     _Peer("pycma-ipop", _ipop),
 )

@@ -30,18 +30,15 @@ from benchmarks.peers.time_scaling_cases import (
 )
 from benchmarks.peers.timing_picture import growth_exponent, growth_figure
 from trajopt.arrays import Array
-from trajopt.limits.acceleration import Acceleration
 from trajopt.limits.slip import Slip
 from trajopt.limits.speed import Speed
 from trajopt.limits.tip import Tip
 from trajopt.limits.wheel_acceleration import WheelAcceleration
 from trajopt.limits.wheel_speed import WheelSpeed
-from trajopt.paths.samples import sample_at
 from trajopt.report.style import in_style, save_figure
-from trajopt.timing.bounds import bounds_profile
 from trajopt.timing.compiled import compiled_profile, fastest_profiles
 from trajopt.timing.scaling import time_scale
-from trajopt.timing.stages import Stages, assemble
+from trajopt.timing.stages import Stages
 from trajopt.timing.toppra import toppra_profile
 
 FIGURES = OUT / "time_scaling"
@@ -162,19 +159,6 @@ def coordinates(repetitions: int) -> ResultTable:
             row("copp-py", copp, theirs, stages, result, exact),
             row("copp-py, with building rows", both, theirs, stages, result, exact),
         ]
-    straight, bounds = speed_and_acceleration()
-    alone = best(lambda: bounds_profile(straight, 0.0, 0.0), repetitions)
-    slower = best(lambda: toppra_profile(straight, 0.0, 0.0), max(3, repetitions // 20))
-    rows.append(
-        row(
-            "bounds, on speed and s'' alone (another problem)",
-            alone,
-            slower,
-            straight,
-            bounds,
-            bounds,
-        )
-    )
     return ResultTable(f"{POINTS} points, speed and acceleration of two coordinates", HEADER, rows)
 
 
@@ -192,15 +176,6 @@ def copp_problem(s: Array, q: Array, dq: Array, ddq: Array) -> tuple[Any, Callab
     return solver.Problem(
         arm.constraints, idx_s_interval=(0, len(s) - 1), a_boundary=(0.0, 0.0)
     ), solver.solve
-
-
-def speed_and_acceleration() -> tuple[Stages, Array]:
-    path = curve()
-    u = np.linspace(path.start, path.end, POINTS)
-    stages = assemble(
-        sample_at(path, path.parameter(u), u), (Speed(1.0), Acceleration(1.0, 1.5)), None
-    )
-    return stages, bounds_profile(stages, 0.0, 0.0)
 
 
 def batch(repetitions: int) -> ResultTable:

@@ -14,8 +14,8 @@ PAGE = Path(__file__).parents[2] / "docs" / "start.md"
 
 def test_the_page_runs_as_it_stands(tmp_path: Path) -> None:
     text = PAGE.read_text(encoding="utf-8")
-    for kind, block in re.findall(r"```(csv|toml)\n(.*?)```", text, re.DOTALL):
-        name = "waypoints.csv" if kind == "csv" else block.split()[1]
+    for kind, block in re.findall(r"```(text|toml)\n(.*?)```", text, re.DOTALL):
+        name = "waypoints.csv" if kind == "text" else block.split()[1]
         (tmp_path / name).write_text(block, encoding="utf-8")
     commands = [
         line.split("  #")[0]

@@ -92,16 +92,15 @@ def test_workers_of_a_dask_cluster() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("d", [2, 3])  # 14 particles, and 15, of which one is left over
 @pytest.mark.parametrize("kind", ["processes", "dask"])
-def test_two_workers_halve_the_time(kind: str) -> None:
+def test_two_workers_halve_the_time_within_15_percent(kind: str, d: int) -> None:
     def seconds(workers: Any) -> float:
-        return minimize(
-            fifty, BOX, optimizer="pso", workers=workers, budget=Budget(100), seed=3
-        ).seconds
+        box, budget = [[-2.0, 3.0]] * d, Budget(100)
+        return minimize(fifty, box, optimizer="pso", workers=workers, budget=budget, seed=3).seconds
 
-    alone = seconds(None)
     if kind == "processes":
-        both = seconds(2)
+        both = min(seconds(2) for _ in range(2))  # the machine may be busy
     else:
         distributed = pytest.importorskip("distributed")
         with (
@@ -110,9 +109,8 @@ def test_two_workers_halve_the_time(kind: str) -> None:
             ) as cluster,
             distributed.Client(cluster) as client,
         ):
-            seconds(client)
-            both = seconds(client)
-    assert both < 0.6 * alone
+            both = min(seconds(client) for _ in range(3))
+    assert both <= 1.15 * 0.5 * seconds(None)
 
 
 def fifty(x: Array) -> float:

@@ -17,6 +17,7 @@ from benchmarks.ground_physics import (
     TIPS,
     driven,
     plan,
+    plan_beyond,
     tip_slope,
     tipped,
 )
@@ -192,8 +193,7 @@ def test_all_drive_as_planned(name: str, place: str, friction: float, engine: st
 
 
 def beyond(name: str, place: str, friction: float, engine: str) -> float:
-    trajectory = plan(name, place, friction, 1.2, "capacity")
-    return driven(trajectory, friction, engine).slip_share
+    return driven(plan_beyond(name, place, friction), friction, engine).slip_share
 
 
 def test_a_sample_slips_beyond_its_limits() -> None:

@@ -8,9 +8,7 @@ from scaling_cases import PATHS, ROBOTS, limit, random_limits, random_path
 
 from trajopt.errors import ArgumentError, InfeasibleError
 from trajopt.paths.samples import sample_path
-from trajopt.timing.bounds import bounds_profile, only_bounds
 from trajopt.timing.compiled import compiled_profile, controllable_sets, fastest_profiles
-from trajopt.timing.engines import pick_engine
 from trajopt.timing.scaling import time_scale
 from trajopt.timing.stages import Stages, assemble
 from trajopt.timing.toppra import toppra_profile
@@ -60,37 +58,6 @@ def test_compiled_is_toppra_on_random_paths_and_limits(first):
             ours, theirs, atol=1e-5 * max(1.0, ours.max()), err_msg=str(seed)
         )
     assert infeasible < BATCH // 5
-
-
-@pytest.mark.parametrize("seed", range(12))
-def test_bounds_is_compiled_where_only_bounds_act(seed):
-    rng = np.random.default_rng(seed)
-    path = random_path(rng, free_heading=False, knots=5)
-    limits = [
-        limit("acceleration", forward=rng.uniform(0.2, 2), braking=rng.uniform(0.2, 2)),
-        limit("speed"),
-        limit("yaw_rate", largest=rng.uniform(0.2, 1.0)),
-        limit("speed_zones", zones=((0.5, 1.0, rng.uniform(0.2, 1.0)),)),
-    ]
-    stages = assemble(sample_path(path, np.linspace(0, path.length, 301)), limits, None)
-    assert only_bounds(stages)
-    assert pick_engine("auto", stages) == "bounds"
-    top = np.sqrt(stages.sd2_max[[0, -1]])
-    for start, end in ((0.0, 0.0), (0.3 * top[0], 0.5 * top[1])):
-        expected = compiled_profile(stages, start**2, end**2)
-        np.testing.assert_allclose(bounds_profile(stages, start**2, end**2), expected, atol=1e-12)
-    with pytest.raises(InfeasibleError) as ours:
-        bounds_profile(stages, 400.0, 0.0)
-    with pytest.raises(InfeasibleError) as theirs:
-        compiled_profile(stages, 400.0, 0.0)
-    assert (ours.value.limit, ours.value.place) == (theirs.value.limit, theirs.value.place)
-
-
-def test_bounds_refuses_rows_with_the_speed_in_them():
-    stages, start, end = random_stages(3, points=40)
-    assert not only_bounds(stages)
-    with pytest.raises(ArgumentError):
-        bounds_profile(stages, start, end)
 
 
 def clarabel_profile(stages: Stages, start: float, end: float) -> np.ndarray:

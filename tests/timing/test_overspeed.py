@@ -23,7 +23,7 @@ def limits(zone: tuple[float, float, float]) -> list:
     ]
 
 
-@pytest.mark.parametrize("engine", ["bounds", "compiled", "toppra"])
+@pytest.mark.parametrize("engine", ["compiled", "toppra"])
 @pytest.mark.parametrize("zone", [(0.0, 3.0, 0.4), (0.3, 3.0, 0.4)])
 def test_a_zone_that_appears_is_braked_into(engine, zone):
     start = 1.5

@@ -12,13 +12,13 @@ from trajopt.paths.path import Path
 from trajopt.timing.scaling import rough_duration, time_scale
 from trajopt.timing.segments import segment_factors
 from trajopt.timing.sensitivity import sensitivities
-from trajopt.timing.stages import fine_rows
+from trajopt.timing.steps import steps
 from trajopt.timing.track import track
 
 DRIVE = [limit("speed", largest=1.0), limit("acceleration", forward=0.5, braking=1.0)]
 
 
-@pytest.mark.parametrize("engine", ["bounds", "compiled", "toppra"])
+@pytest.mark.parametrize("engine", ["compiled", "toppra"])
 def test_a_stop_on_the_way_costs_braking_and_starting(engine):
     through = time_scale(PATHS["straight"], DRIVE, engine=engine)
     stopped = time_scale(PATHS["straight"], DRIVE, engine=engine, stops=[0.8])
@@ -74,8 +74,7 @@ def test_segments_lie_between_linear_and_the_optimum():
         assert segments.engine == "segments"
         assert min(segments.margins().values()) >= -1e-9
         assert segments.duration >= best.duration * (1 - 1e-6)
-        fine = fine_rows(track(path, robot), segments.u, limits)
-        factors = segment_factors(path, fine)
+        factors = segment_factors(steps(track(path, robot), segments.u, limits))
         knots = np.searchsorted(segments.u, path.basis.knots)
         for k, factor in enumerate(factors):
             inside = slice(knots[k] + 1, knots[k + 1])
@@ -90,7 +89,7 @@ def test_segment_factors_follow_a_given_profile():
     path = Path.through([[0, 0], [2, 0], [3, 0], [6, 0]], knots=[0.0, 1.0, 2.0, 3.0])
     profile = limit("speed_profile", places=(0.0, 6.0), speeds=(0.5, 2.0))
     u = np.linspace(0, 3, 301)
-    factors = segment_factors(path, fine_rows(track(path), u, [profile]))
+    factors = segment_factors(steps(track(path), u, [profile]))
     dense = np.linspace(0, 3, 3001)
     ratio = path.rate(dense) / np.interp(path.parameter(dense), [0, 6], [0.5, 2.0])
     expected = [ratio[i * 1000 : (i + 1) * 1000 + 1].max() for i in range(3)]

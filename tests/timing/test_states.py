@@ -65,7 +65,7 @@ def test_near_cusps_too(name):
 def test_motions_without_a_profile():
     trajectory = nominal_timing(PATHS["slalom"], 7.0, [Speed(1.0)], robot=robot("loc8"))
     agree(trajectory, np.linspace(0.0, 7.0, 301))
-    bare = time_scale(PATHS["slalom"], [Speed(1.0), Acceleration(1.0, 1.0)], engine="bounds")
+    bare = time_scale(PATHS["slalom"], [Speed(1.0), Acceleration(1.0, 1.0)], engine="toppra")
     agree(bare, np.linspace(0.0, bare.duration, 301))
 
 

@@ -76,7 +76,7 @@ def by_toppra(case: Wild, graded: np.ndarray, count: int = 4000) -> Trajectory |
     ends = np.stack([u[:-1], np.nextafter(u[1:], -np.inf)], axis=1).ravel()
     try:
         rows = assemble(along.samples(np.repeat(s, 2)[1:-1], ends), case.limits, case.robot)
-        squares = toppra_profile(rows, 0.0, 0.0)[rows.kept]
+        squares = toppra_profile(rows, 0.0, 0.0)
     except TrajoptError:
         return None
     places = np.union1d(u, graded)

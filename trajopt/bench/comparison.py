@@ -10,6 +10,7 @@ final candidate.
 from __future__ import annotations
 
 import json
+import re
 import time
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
@@ -48,9 +49,10 @@ _WARM = Budget(evaluations=60)  # a first search that loads and compiles, timed 
 class BenchPlan:
     """What a benchmark runs: ``seeds`` each for stochastic optimizers, one for others.
 
-    A search may use ``evaluations`` and ``seconds`` of processor time; ``longer`` gives other
-    seconds to problems whose names start with a text. ``time_limit`` (wall-clock s) is when a case
-    counts as hanging.
+    A search may use ``evaluations`` and ``seconds`` of processor time, or runs once under each of
+    ``budgets``: texts like "0.15 s", "1000 evaluations", "1000 evaluations, 0.15 s". ``longer``
+    gives so many times the seconds to problems whose names start with a text. ``time_limit``
+    (wall-clock s) is when a case counts as hanging.
     """
 
     title: str
@@ -60,13 +62,15 @@ class BenchPlan:
     evaluations: int = 25_000  # 50 particles x 500 iterations, [guzman2015] Table 5.8
     seconds: float = 10.0
     longer: Mapping[str, float] = field(default_factory=dict)
+    budgets: tuple[str, ...] = ()
     time_limit: float = 60.0
     problem_root: str = "problems"
     plugins: tuple[str, ...] = ()
 
     def cases(self) -> list[dict[str, Any]]:
-        """One case a problem, optimizer and seed; optimizers that cannot work on a problem are left
-        out."""
+        """One case a problem, optimizer, budget and seed; optimizers that cannot work on a problem
+        are left out."""
+        budgets = self.budgets or (f"{self.evaluations} evaluations, {self.seconds:g} s",)
         makers = {name: named_optimizer(name, self.plugins) for name in self.optimizers}
         found = []
         for problem in self.problems:
@@ -76,7 +80,9 @@ class BenchPlan:
                     continue
                 seeds = self.seeds if method.stochastic else 1
                 found += [
-                    {"problem": problem, "optimizer": name, "seed": seed} for seed in range(seeds)
+                    {"problem": problem, "optimizer": name, "budget": budget, "seed": seed}
+                    for budget in budgets
+                    for seed in range(seeds)
                 ]
         # Five seeds of everything first: what was built for a problem serves them all, and a run
         # that is stopped early leaves rows of all problems.
@@ -134,9 +140,14 @@ def load_bench(path: str | Path, plugins: Iterable[str | Path] = (), **changes: 
     if not isinstance(longer, dict) or not all(
         isinstance(v, (int, float)) and v > 0 for v in longer.values()
     ):
-        raise ArgumentError(
-            f"{path}: longer", longer, "seconds > 0 by the start of a problem's name"
-        )
+        expected = "a factor > 0 of the seconds by the start of a problem's name"
+        raise ArgumentError(f"{path}: longer", longer, expected)
+    if "budgets" in data:
+        for key in data.keys() & {"evaluations", "seconds"}:
+            raise ArgumentError(f"{path}: {key}", data[key], "left out beside budgets")
+        data["budgets"] = tuple(data["budgets"]) if isinstance(data["budgets"], list) else ("",)
+        for text in data["budgets"]:
+            budget_of(f"{path}: budgets", text)
     files = [str(Path(p).resolve()) for p in (*data.pop("plugins", []), *plugins)]
     problems: list[str] = []
     for name in data.pop("problems"):
@@ -153,13 +164,26 @@ def load_bench(path: str | Path, plugins: Iterable[str | Path] = (), **changes: 
     )
 
 
+def budget_of(argument: str, text: Any, longer: float = 1.0) -> Budget:
+    """The budget that a text like "1000 evaluations, 0.15 s" names, with ``longer`` times the
+    seconds, which are those of the processor. Raises ArgumentError for other texts."""
+    found = re.fullmatch(r"(?:(\d+) evaluations)?(?:(?:^|, )([\d.e+-]+) s)?", str(text))
+    if not found or not str(text):
+        expected = 'texts like "0.15 s", "1000 evaluations" or "1000 evaluations, 0.15 s"'
+        raise ArgumentError(argument, text, expected)
+    evaluations, seconds = found.groups()
+    return Budget(
+        int(evaluations) if evaluations else None,
+        longer * float(seconds) if seconds else None,
+        clock="cpu",
+    )
+
+
 @dataclass(frozen=True)
 class BenchRun:
-    """The sweep's run function: one search. ``seconds`` by the start of a problem's name; "" stands
-    for all."""
+    """The sweep's run function: one search. ``longer``: as in the plan."""
 
-    evaluations: int
-    seconds: tuple[tuple[str, float], ...]
+    longer: tuple[tuple[str, float], ...]
     problem_root: str
     plugins: tuple[str, ...]
 
@@ -169,10 +193,9 @@ class BenchRun:
         problem, method, construct = _built(
             name, str(case["optimizer"]), self.plugins, self.problem_root
         )
-        fitting = [entry for entry in self.seconds if name.startswith(entry[0])]
-        budget = Budget(
-            self.evaluations, max(fitting, key=lambda entry: len(entry[0]))[1], clock="cpu"
-        )
+        fitting = [("", 1.0), *(entry for entry in self.longer if name.startswith(entry[0]))]
+        times = max(fitting, key=lambda entry: len(entry[0]))[1]
+        budget = budget_of("budgets", case["budget"], times)
         found = _search(problem, method, int(case["seed"]), budget)
         return {
             "dimension": problem.objective.dimension,
@@ -256,13 +279,9 @@ def run_bench(
 ) -> Store:
     """Run all cases that have no row in ``store`` yet (or only a failed one), ``jobs`` at a time;
     ``old`` as in ``sweep``."""
-    seconds = (("", plan.seconds), *sorted(plan.longer.items()))
-    run = BenchRun(plan.evaluations, seconds, str(Path(plan.problem_root).resolve()), plan.plugins)
-    about = {
-        "evaluations": plan.evaluations,
-        "seconds": dict(seconds),
-        "plugins": list(plan.plugins),
-    }
+    longer = tuple(sorted(plan.longer.items()))
+    run = BenchRun(longer, str(Path(plan.problem_root).resolve()), plan.plugins)
+    about = {"longer": dict(longer), "plugins": list(plan.plugins)}
     return sweep(
         plan.cases(),
         run,

@@ -75,14 +75,14 @@ class PySwarms:
 
 @dataclass(frozen=True)
 class Pymoo:
-    """pymoo's PSO with its defaults (adaptive coefficients, random restarts off)."""
+    """pymoo's PSO with its defaults (25 particles, adaptive coefficients, random restarts off)."""
 
     name: ClassVar[str] = "pymoo-pso"
     needs: ClassVar[frozenset[Capability]] = frozenset()
     stochastic: ClassVar[bool] = True
     only_bounds: ClassVar[bool] = True
 
-    particles: int = 50
+    particles: int = 25
 
     def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:  # noqa: ARG002
         """Search; the package knows no start and no constraints."""

@@ -24,6 +24,7 @@ from trajopt.report.style import (
     save_figure,
 )
 
+SWARM, _THICK = "pso", 2.6  # how names of swarms begin; width of the leading one's line, chosen
 PROFILE_SHARE = (
     1e-5  # of reference - best: the accuracy of data and performance profiles; Moré and Wild's tau
 )
@@ -48,9 +49,11 @@ def save_bench_pictures(tables: BenchTables, out: Path) -> dict[str, tuple[str, 
 
 
 def shown(tables: BenchTables) -> dict[str, str]:
-    """Colours of the optimizers that pictures show: as many of the leading ones as can be told apart; tables hold
-    all."""
-    return dict(zip(tables.leaders[:MOST_LINES], LINE_COLOURS, strict=False))
+    """Colours of the optimizers that pictures show: the leading swarm first, drawn thick and in
+    front, then as many of the others that lead as can be told apart; tables hold all."""
+    swarm = [name for name in tables.leaders if name.startswith(SWARM)][:1]
+    others = [name for name in tables.leaders if name not in swarm]
+    return dict(zip([*swarm, *others][:MOST_LINES], LINE_COLOURS, strict=False))
 
 
 def _legend(figure: Figure, tables: BenchTables, named: Mapping[str, Artist]) -> None:
@@ -158,4 +161,5 @@ def _curves(
 
 
 def _steps(axes: Axes, x: Array, y: Array, colour: str, name: str) -> None:
-    axes.step(x, y, label=name, where="post", color=colour)
+    width = _THICK if name.startswith(SWARM) else 1.2
+    axes.step(x, y, label=name, where="post", color=colour, linewidth=width)

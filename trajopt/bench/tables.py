@@ -13,9 +13,9 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.bench.comparison import TARGETS
+from trajopt.bench.comparison import TARGETS, budget_of
 from trajopt.bench.problems import best_costs, families
-from trajopt.bench.profiles import RunningTime, expected_running_time, no_worse, time_to_targets
+from trajopt.bench.profiles import RunningTime, expected_running_time, time_to_targets
 from trajopt.errors import ArgumentError
 
 Row = Mapping[str, Any]
@@ -28,19 +28,36 @@ GRADIENT_METHODS = ("ipopt", "slsqp", "l-bfgs-b", "trust-constr", "least-squares
 
 class Share(NamedTuple):
     """How an optimizer did on a family: shares of searches ``solved`` and ``near`` (SOLVED, NEAR),
-    the median share ``left`` and the median ``seconds`` of a search."""
+    the median share ``left``, the median ``seconds`` of a search, and how many ``searches``."""
 
     solved: float
     near: float
     left: float
     seconds: float
+    searches: int
 
 
 @dataclass(frozen=True)
 class BenchTables:
-    """Everything the report needs, from the ``rows`` of a store."""
+    """Everything the report needs, from ``rows`` of a store that had one budget. Best costs are
+    those of ``others`` too."""
 
     rows: Sequence[Row]
+    others: Sequence[Row] = ()
+
+    @classmethod
+    def by_budget(cls, rows: Sequence[Row]) -> dict[str, BenchTables]:
+        """The tables of each budget of a store's rows: those in evaluations first, each kind from
+        small to large."""
+        found: dict[str, list[Row]] = {}
+        for row in rows:
+            found.setdefault(str(row["budget"]), []).append(row)
+
+        def size(text: str) -> tuple[bool, float]:
+            budget = budget_of("budget", text)
+            return budget.seconds is not None, budget.seconds or budget.evaluations or 0.0
+
+        return {text: cls(found[text], rows) for text in sorted(found, key=size)}
 
     def __post_init__(self) -> None:
         if not self.done:
@@ -63,6 +80,15 @@ class BenchTables:
     def optimizers(self) -> tuple[str, ...]:
         return tuple(sorted({str(row["optimizer"]) for row in self.rows}))
 
+    @property
+    def seeds(self) -> str:
+        """How many seeds problems have: "5", or "3 to 5"."""
+        seen: dict[Any, set[Any]] = {}
+        for row in self.rows:
+            seen.setdefault(row["problem"], set()).add(row["seed"])
+        counts = sorted({len(seeds) for seeds in seen.values()})
+        return " to ".join(map(str, dict.fromkeys((counts[0], counts[-1]))))
+
     @cached_property
     def leaders(self) -> tuple[str, ...]:
         """All optimizers, those first that reach most targets in the mean over the families of problems; a search that
@@ -74,7 +100,7 @@ class BenchTables:
 
     @cached_property
     def best(self) -> dict[str, tuple[float, str]]:
-        return best_costs(self.rows)
+        return best_costs([*self.rows, *self.others])
 
     @cached_property
     def dimension(self) -> Array:
@@ -97,6 +123,12 @@ class BenchTables:
                 word = Path(problem).name if file else problem.split("/")[0]
                 found.setdefault(word, []).append(i)
         return {name: places for name, places in found.items() if places}
+
+    def spread(self, problem: str) -> float:
+        """``scale`` of a problem by its name."""
+        rows = (row for row in (*self.done, *self.others) if row["status"] == "done")
+        row = next(row for row in rows if row["problem"] == problem)
+        return self.scale(problem, row)
 
     def scale(self, problem: str, row: Row) -> float:
         """Cost difference that shares count from: the median random point's cost less the best
@@ -162,6 +194,7 @@ class BenchTables:
                         float(np.mean(gaps <= NEAR)),
                         float(gaps[(len(gaps) - 1) // 2]),
                         float(np.median(seconds)) if seconds else float("nan"),
+                        len(rows),
                     )
         return found
 
@@ -199,22 +232,20 @@ class BenchTables:
 
     def compared(
         self, first: str, second: str, start: str = "classical/"
-    ) -> list[tuple[str, float, float, float]]:
-        """Problem, median cost of each, p-value of "first is worse" (rank-sum test), on problems
-        named ``start``..."""
+    ) -> list[tuple[str, Array, Array]]:
+        """Problem, costs of each, where problems are named ``start``..."""
         found = []
         for problem in self.problems:
-            costs = [
-                [r["cost"] for r in self.done if r["problem"] == problem and r["optimizer"] == name]
-                for name in (first, second)
-            ]
-            if problem.startswith(start) and all(costs):
-                found.append(
-                    (
-                        problem,
-                        float(np.median(costs[0])),
-                        float(np.median(costs[1])),
-                        no_worse(*costs),
-                    )
+            ours, theirs = (
+                np.array(
+                    [
+                        r["cost"]
+                        for r in self.done
+                        if r["problem"] == problem and r["optimizer"] == name
+                    ]
                 )
+                for name in (first, second)
+            )
+            if problem.startswith(start) and len(ours) and len(theirs):
+                found.append((problem, ours, theirs))
         return found

@@ -72,6 +72,10 @@ def switched(command: Callable[..., None], *, tells: bool = False) -> Callable[.
         console.lines = not (asked["quiet"] or console.as_json)
         if asked["verbose"]:
             logging.basicConfig(level=logging.INFO, format="%(message)s")
+        elif console.lines and sys.stderr.isatty():
+            told = logging.getLogger("trajopt.kernels")  # that it compiles, which takes long
+            told.setLevel(logging.INFO)
+            told.addHandler(logging.StreamHandler())
         command(**given)
 
     hints = get_type_hints(command, include_extras=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import require_positive
-from trajopt.limits.limit import Rows, linear_rows
+from trajopt.limits.limit import Limit, Rows, linear_rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
@@ -17,7 +17,7 @@ _MOVING = (
 
 
 @dataclass(frozen=True)
-class Acceleration:
+class Acceleration(Limit):
     """Rate of translational speed between -``braking`` and ``forward``, m/s^2 ([waheed2006], eqs.
     2.7, 2.8).
 

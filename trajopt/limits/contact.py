@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 from trajopt.arrays import as_numbers
 from trajopt.errors import ArgumentError
-from trajopt.limits.limit import Rows, linear_rows, require_robot
+from trajopt.limits.limit import Limit, Rows, linear_rows, require_robot
 from trajopt.limits.loads import contact_loads
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 
 
 @dataclass(frozen=True)
-class Contact:
+class Contact(Limit):
     """The load on every wheel stays >= ``share`` of an even share of the weight, as a suspension of
     equal stiffness everywhere gives it; 0 is where a wheel lifts.
 

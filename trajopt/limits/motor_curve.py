@@ -10,7 +10,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
-from trajopt.limits.limit import Rows, require_robot, spins
+from trajopt.limits.limit import Limit, Rows, require_robot, spins
 from trajopt.limits.torques import tangent_speed, wheel_torques
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.description import MotorSection
@@ -20,7 +20,7 @@ Curve = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
-class MotorCurve:
+class MotorCurve(Limit):
     """Torque of every motor that has a ``curve`` in the robot's file <= its curve at the speed of
     the wheel, and the wheel no faster than the curve's last point.
 

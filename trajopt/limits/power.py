@@ -9,14 +9,14 @@ import numpy as np
 
 from trajopt.arrays import require_positive
 from trajopt.limits.forces import Affine
-from trajopt.limits.limit import Rows, linear_rows, require_robot
+from trajopt.limits.limit import Limit, Rows, linear_rows, require_robot
 from trajopt.limits.torques import motor_power, tangent_speed
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
-class Power:
+class Power(Limit):
     """Sum over the motors of torque times speed <= ``largest``, W: mechanical power, in which a
     motor that brakes feeds the others. Braking is not bounded.
 

@@ -13,7 +13,7 @@ from trajopt.limits.capacity import capacity_rows, friction_used
 from trajopt.limits.forces import Affine, specific_force
 from trajopt.limits.friction import Friction, coefficients, edges, require_friction
 from trajopt.limits.grip import contact_forces, holds_of
-from trajopt.limits.limit import Rows, linear_rows, require_robot
+from trajopt.limits.limit import Limit, Rows, linear_rows, require_robot
 from trajopt.limits.loads import contact_loads
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.description import Sharing
@@ -21,7 +21,7 @@ from trajopt.robots.robot import STANDARD_GRAVITY, Robot
 
 
 @dataclass(frozen=True)
-class Slip:
+class Slip(Limit):
     """Friction coefficient ``friction`` between wheels and ground, with load transfer, slope and
     curvature: one number, one a wheel of the robot's file, or a ``FrictionAlong`` or
     ``FrictionMap``. ``rule`` says how wheels share a force that more of them hold than need to; None: as

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import require_positive
-from trajopt.limits.limit import Rows, speed_rows
+from trajopt.limits.limit import Limit, Rows, speed_rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
-class Speed:
+class Speed(Limit):
     """Translational speed of the body origin <= ``largest``, m/s ([waheed2006], eq. 2.6).
 
     Where the robot turns on the spot only translation counts, so nothing is bounded there.

@@ -8,7 +8,7 @@ import numpy as np
 
 from trajopt.arrays import Array, require_finite, require_not_negative, require_rising
 from trajopt.errors import ArgumentError
-from trajopt.limits.limit import Rows
+from trajopt.limits.limit import Limit, Rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
@@ -16,7 +16,7 @@ _TOUCH = 1e-9  # m; a zone reaches this far beyond its ends, so that the gridpoi
 
 
 @dataclass(frozen=True)
-class SpeedZones:
+class SpeedZones(Limit):
     """Path speed s' <= speed inside zones: ``zones`` holds (from, to, speed) in m, m, m/s; they may
     overlap.
 
@@ -43,7 +43,7 @@ class SpeedZones:
 
 
 @dataclass(frozen=True)
-class SpeedProfile:
+class SpeedProfile(Limit):
     """Path speed s' <= a profile: linear in s between ``places`` (m) with ``speeds`` (m/s),
     constant beyond.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trajopt.limits.limit import (
+    Limit,
     Rows,
     by_wheel,
     linear_rows,
@@ -22,7 +23,7 @@ _CORNER = 1e-3  # rad, chosen: a tenth of what a steering may deviate from its p
 
 
 @dataclass(frozen=True)
-class SteeringAcceleration:
+class SteeringAcceleration(Limit):
     """|steering acceleration| <= ``largest``, rad/s^2, of every [[steering]] of the robot; one number, or one
     each (G,), inf where there is no limit; None: those of the robot's file.
 

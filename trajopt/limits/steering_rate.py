@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.limits.limit import (
+    Limit,
     Rows,
     by_wheel,
     require_each_positive,
@@ -20,7 +21,7 @@ from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
-class SteeringRate:
+class SteeringRate(Limit):
     """|steering rate| <= ``largest``, rad/s, of every [[steering]] of the robot; one number, or one
     each (G,), inf where there is no limit; None: those of the robot's file.
 

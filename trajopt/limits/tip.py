@@ -8,7 +8,7 @@ import numpy as np
 
 from trajopt.arrays import Array, require_not_negative
 from trajopt.errors import ArgumentError
-from trajopt.limits.limit import Rows, linear_rows, require_robot
+from trajopt.limits.limit import Limit, Rows, linear_rows, require_robot
 from trajopt.limits.loads import supports
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import STANDARD_GRAVITY, Robot
@@ -18,7 +18,7 @@ _COINCIDE = 1e-9  # m
 
 
 @dataclass(frozen=True)
-class Tip:
+class Tip(Limit):
     """No tipping fore, aft or sideways; ``reserve`` (m) keeps the zero-moment point that far
     inside.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.limits.limit import (
+    Limit,
     Rows,
     by_wheel,
     linear_rows,
@@ -19,7 +20,7 @@ from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
-class WheelAcceleration:
+class WheelAcceleration(Limit):
     """|angular acceleration| <= ``largest``, rad/s^2, of every wheel; one number, or one a wheel
     (W,), inf where a wheel has no limit.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.limits.limit import (
+    Limit,
     Rows,
     by_wheel,
     require_each_positive,
@@ -19,7 +20,7 @@ from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
-class WheelSpeed:
+class WheelSpeed(Limit):
     """|wheel rate| <= ``largest``, rad/s, of every wheel (rolling rows of [wheels-lecture]); one
     number, or one a wheel (W,), inf where a wheel has no limit.
 

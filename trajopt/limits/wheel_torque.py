@@ -6,14 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trajopt.limits.limit import Rows, by_wheel, linear_rows, require_each_positive, require_robot
+from trajopt.limits.limit import (
+    Limit,
+    Rows,
+    by_wheel,
+    linear_rows,
+    require_each_positive,
+    require_robot,
+)
 from trajopt.limits.torques import wheel_torques
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
-class WheelTorque:
+class WheelTorque(Limit):
     """|torque of its motor| <= ``largest``, N m, at every wheel; one number, or one a wheel (W,),
     inf where a wheel has no limit; None: what the robot's file gives.
 

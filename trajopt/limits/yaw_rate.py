@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import require_positive
-from trajopt.limits.limit import Rows, speed_rows
+from trajopt.limits.limit import Limit, Rows, speed_rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
 
 @dataclass(frozen=True)
-class YawRate:
+class YawRate(Limit):
     """|yaw rate| <= ``largest``, rad/s. Raises ArgumentError unless ``largest`` > 0."""
 
     largest: float  # rad/s

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,15 +31,12 @@ class Answers:
         except Exception as error:
             self.count(n, f"{type(error).__name__}: {error}")
             return Evaluation(np.full(n, np.inf), np.full(n, np.inf))
-        total = np.add.reduce(cost) + np.add.reduce(violation)
+        finite = np.isfinite(cost) & np.isfinite(violation)
+        if np.count_nonzero(finite) == n and (values is None or np.isfinite(values).all()):
+            return answer  # the usual case, quick
         if values is not None:
-            total = total + values.sum()
-        if math.isfinite(total):  # then each is; the usual case, quick
-            return answer
-        bad = ~(np.isfinite(cost) & np.isfinite(violation))
-        if values is not None:
-            bad |= ~np.isfinite(values).all(axis=1)
-        return self._without(rows, answer, bad) if bad.any() else answer
+            finite &= np.isfinite(values).all(axis=1)
+        return self._without(rows, answer, ~finite)
 
     def count(self, failures: int, reason: str) -> None:
         self.failures += failures

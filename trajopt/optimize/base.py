@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from trajopt.optimize.run import Run
 
 FEASIBLE = 1e-8  # violation up to which a candidate counts as feasible (rounding), chosen
+_LEAST_WIDTH = 1e-290  # of bounds: steps of differences are a part of it, chosen
 DEFAULT_EVALUATIONS = 25_000  # 50 particles x 500 iterations, [guzman2015] Table 5.8
 
 
@@ -191,6 +192,11 @@ def checked_bounds(bounds: ArrayLike, dimension: int | None = None) -> Array:
         )
     if not np.all(np.isfinite(array)) or np.any(array[:, 0] >= array[:, 1]):
         raise ArgumentError("bounds", array.tolist(), "finite bounds, each lower < upper")
+    with np.errstate(over="ignore"):
+        width = array[:, 1] - array[:, 0]
+    if np.any(width < _LEAST_WIDTH + 1e-12 * np.abs(array).max(axis=1)) or np.isinf(width).any():
+        expected = "bounds whose widths are finite and more than rounding"
+        raise ArgumentError("bounds", array.tolist(), expected)
     if dimension is not None and len(array) != dimension:
         raise ArgumentError("bounds", array.shape, f"{dimension} rows, one a decision variable")
     return array

@@ -31,11 +31,18 @@ class Constraint:
 
     def values(self, x: Array) -> Array:
         """(k,)"""
-        return numbers(self.function(x), "a constraint").ravel()
+        found = self.function(x)
+        if np.asarray(found).dtype == np.bool_:
+            raise ValueError("a constraint returned True or False; expected numbers")
+        return numbers(found, "a constraint").ravel()
 
     def limits(self, count: int) -> Array:
         """(2, k)"""
-        return np.stack([np.broadcast_to(np.ravel(v), count) for v in (self.lower, self.upper)])
+        limits = [np.ravel(v) for v in (self.lower, self.upper)]
+        if any(len(v) not in (1, count) for v in limits):
+            long = max(map(len, limits))
+            raise ValueError(f"a constraint returned {count} values, which has {long} limits")
+        return np.stack([np.broadcast_to(v, count) for v in limits])
 
 
 def constraint_list(given: Any) -> list[Any]:
@@ -57,13 +64,15 @@ def _is_jacobian(second: Any) -> bool:
     return second is None or (callable(second) and not of_casadi(second))
 
 
-def constraint(item: Any) -> Constraint:
-    """One constraint from any of its forms."""
+def constraint(item: Any, d: int) -> Constraint:
+    """One constraint on ``d`` variables from any of its forms."""
     if isinstance(item, Constraint):
         return item
     if _of_scipy(item):
-        return _from_scipy(item)
+        return _from_scipy(item, d)
     if isinstance(item, Mapping):
+        for key in item.keys() - {"type", "fun", "jac", "args"}:
+            raise ArgumentError(f"constraints.{key}", item[key], "left out: type, fun, jac, args")
         item = (item.get("type"), _with_args(item, "fun"), _with_args(item, "jac"))
     if callable(item):
         return Constraint(item, jacobian=getattr(item, "gradient", None))
@@ -86,12 +95,16 @@ def _with_args(item: Mapping[str, Any], key: str) -> Any:
     return (lambda x: function(x, *args)) if args and callable(function) else function
 
 
-def _from_scipy(item: Any) -> Constraint:
+def _from_scipy(item: Any, d: int) -> Constraint:
     if np.any(item.keep_feasible):
         expected = "False: searches may pass through infeasible candidates"
         raise ArgumentError("constraints.keep_feasible", item.keep_feasible, expected)
+    if not np.all(np.asarray(item.lb) <= np.asarray(item.ub)):
+        raise ArgumentError("constraints.lb", item.lb, f"limits up to ub, {item.ub}")
     if hasattr(item, "A"):
         matrix = np.atleast_2d(item.A.toarray() if hasattr(item.A, "toarray") else item.A)
+        if matrix.shape[1] != d:
+            raise ArgumentError("constraints.A", matrix.shape, f"{d} columns, one a variable")
         return Constraint(lambda x: matrix @ x, item.lb, item.ub, lambda _: matrix)
     if not callable(item.jac) and not isinstance(item.jac, str):
         raise ArgumentError("constraints.jac", item.jac, "a function, or left out")
@@ -115,8 +128,10 @@ def of_casadi(item: Any) -> bool:
 
 def numbers(value: Any, who: str) -> Array:
     """As an array of real numbers. Raises ValueError for None, text, masked values and the like."""
-    if type(value) is float:  # the usual case, and quick
+    if type(value) is float:  # the usual cases, and quick
         return np.float64(value)  # type: ignore[return-value]
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
     if value is None:
         raise ValueError(f"{who} returned None; does it end without 'return'?")
     if np.ma.is_masked(value):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from trajopt.optimize.run import Run
 
 _DIFFERENCE = 1.5e-8  # of the width: step of forward differences, square root of the rounding
+_ROUNDING = 1.5e-14  # of the value: least step, some 64 units of rounding, chosen
 _STEPS_BACK = 3  # onto constraints that are missed by little, chosen
 _LITTLE = 1e-2  # of the width, largest of those steps, chosen
 
@@ -74,7 +75,9 @@ class Derivatives:
     def _differences(self, x: Array) -> tuple[Array, Array]:
         run = self.run
         here = run.at(x)
-        step = _DIFFERENCE * run.width
+        # Where bounds are narrow for their size: at least some units of rounding.
+        least = np.minimum(_ROUNDING * np.abs(x), run.width / 2)
+        step = np.maximum(_DIFFERENCE * run.width, least)
         ahead = x + np.diag(np.where(x + step > run.bounds[:, 1], -step, step))
         there = run.evaluate(ahead, inside=True)
         step = np.diagonal(ahead) - x  # as rounded

@@ -64,9 +64,12 @@ class FunctionObjective:
             return Evaluation(cost, free)
         found = [[c.values(row) for c in self.constraints] for row in candidates]
         values = np.array([np.concatenate(row) for row in found])
-        if self._limits is None or self._limits.shape[1] != values.shape[1]:
+        if self._limits is None:
             parts = [c.limits(len(v)) for c, v in zip(self.constraints, found[0], strict=True)]
             self._limits = np.concatenate(parts, axis=1)
+        if values.shape[1] != self._limits.shape[1]:
+            count = self._limits.shape[1]
+            raise ValueError(f"constraints returned {values.shape[1]} values, and {count} before")
         return Evaluation(cost, free, values, self._limits)
 
     def cost(self, x: Array) -> float:
@@ -110,8 +113,14 @@ def as_objective(
     """The objective itself, or a plain function (or a function or expression of CasADi) wrapped as
     one. Raises ArgumentError for what cannot be called or used."""
     items = constraint_list(constraints)
+    if not isinstance(args, (tuple, list, np.ndarray)):
+        raise ArgumentError("args", args, "a tuple of what else the function takes")
     if isinstance(objective, Objective):
-        for name, value in (("jac", jac), ("constraints", items or None), ("args", args or None)):
+        for name, value in (
+            ("jac", jac),
+            ("constraints", items or None),
+            ("args", tuple(args) or None),
+        ):
             if value is not None:
                 expected = "none: this objective brings its own"
                 raise ArgumentError(name, value, expected)
@@ -130,11 +139,11 @@ def as_objective(
     jac = getattr(objective, "gradient", None) if jac is None else jac
     if not (jac is None or isinstance(jac, bool) or callable(jac)):
         raise ArgumentError("jac", jac, "a function that gives the gradient (d,), True or None")
-    found = tuple(constraint(item) for item in items)
+    found = tuple(constraint(item, len(bounds)) for item in items)
     # A gradient or constraints are given for single candidates: then the cost is too.
     single = bool(jac or found)
     return FunctionObjective(
-        objective, len(bounds), False if single else batch, args, jac or None, found
+        objective, len(bounds), False if single else batch, tuple(args), jac or None, found
     )
 
 

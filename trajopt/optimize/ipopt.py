@@ -124,6 +124,8 @@ class _Program:
             run.constructed()
             here = run.at(start)  # tells how many constraints there are
             self.limits = np.zeros((2, 0)) if run.limits is None else run.limits
+            if np.sum(self.limits[0] == self.limits[1]) > len(start):
+                raise NoGradient("IPOPT takes no more equalities than variables")
             self.values: Callable[[Array, Array], tuple[float, Array]] = self._by_run
             if isinstance(run.objective, FunctionObjective):
                 written = _of_function(run, run.objective, start, float(here.cost[0]))

@@ -10,6 +10,7 @@ from typing import NoReturn
 
 import numpy as np
 
+from trajopt.kernels import compiling
 from trajopt.optimize.base import FEASIBLE, Budget, StageOver, Status, Stop
 from trajopt.optimize.process import interrupted
 from trajopt.optimize.record import Record
@@ -83,7 +84,10 @@ class Limited(Record):
         return self._now() - self._started
 
     def _now(self) -> float:
-        return time.perf_counter() if self.budget.clock == "wall" else time.process_time()
+        """By the budget's clock, which stands while kernels are compiled."""
+        clock = self.budget.clock
+        now = time.perf_counter() if clock == "wall" else time.process_time()
+        return now - compiling(clock)
 
     def remaining(self) -> int:
         """Evaluations left (a large number when unlimited)."""
@@ -111,5 +115,5 @@ class Limited(Record):
         met = target is not None and self.best_cost <= target + _ROUNDING * abs(target)
         if met and self.best_violation <= FEASIBLE:
             self.stop(Status.TARGET)
-        if self._late() and not (before and self.nfev == 0):
+        if self._late() and not (before and self._kept == 0):  # one is always evaluated
             self._over(Status.SECONDS)

@@ -30,7 +30,7 @@ from trajopt.optimize.lattice import Lattice
 from trajopt.optimize.newton import Newton
 from trajopt.optimize.pso import local_best
 from trajopt.optimize.run import Run
-from trajopt.optimize.scipy import ScipyLocal, slsqp
+from trajopt.optimize.scipy import ScipyLocal
 
 Stages = list[tuple[Any, float]]  # methods, each with its share
 _ALL = 1.0
@@ -69,9 +69,9 @@ def stages(objective: Objective) -> Stages:
     last = local_best() if objective.constrained else CmaEs()
     smooth = Capability.GRADIENT in offers
     if objective.constrained:
-        return [(slsqp(), 0.5 if smooth else 0.3), (last, _ALL)]
+        return [(ScipyLocal("SLSQP"), 0.5 if smooth else 0.3), (last, _ALL)]
     if smooth:
-        return [(slsqp(), 0.5), (last, _ALL)]
+        return [(ScipyLocal("SLSQP"), 0.5), (last, _ALL)]
     return [(ScipyLocal("L-BFGS-B", starts=1), 0.1), (last, _ALL)]
 
 

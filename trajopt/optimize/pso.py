@@ -30,7 +30,7 @@ from numpy.typing import ArrayLike
 from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
-from trajopt.optimize.base import Status, checked_bounds, checked_x0
+from trajopt.optimize.base import FEASIBLE, Status, checked_bounds, checked_x0
 from trajopt.optimize.derivatives import onto_constraints
 from trajopt.optimize.run import Run
 from trajopt.optimize.swarm import Swarm, SwarmRules, warm
@@ -160,10 +160,10 @@ class ParticleSwarm:
         )
 
     def _search(self, run: Run, swarm: Swarm) -> tuple[Status, str]:
-        run.keep(swarm)
+        resumed = run.keep(swarm)
         unseen = 0  # iterations in a row without a particle inside
         inside = self.boundary != "none"
-        levels = Levels(run)
+        levels = Levels(run, swarm.level if resumed and swarm.level > FEASIBLE else 0.0)
         share = _share(run, swarm)
         while True:
             swarm.used = share()
@@ -197,10 +197,18 @@ class ParticleSwarm:
 
 def _share(run: Run, swarm: Swarm) -> Callable[[], float]:
     """What tells the share of the budget that is used up: by iterations, not by what else counts as
-    an evaluation, so that workers give the same bits."""
-    begun, most = swarm.iteration, run.remaining() / len(swarm.x)
-    seconds = run.budget.seconds or math.inf
-    return lambda: min(1.0, max((swarm.iteration - begun) / most, run.elapsed / seconds))
+    an evaluation, so that workers give the same bits. A saved search goes on as if all its budgets
+    had been one."""
+    if swarm.rules.final_inertia is None:
+        return lambda: 0.0
+    most, before = swarm.iteration + run.remaining() / len(swarm.x), swarm.seconds
+    seconds = before + (run.budget.seconds or math.inf)
+
+    def used() -> float:
+        swarm.seconds = before + run.elapsed
+        return min(1.0, max(swarm.iteration / most, swarm.seconds / seconds))
+
+    return used
 
 
 def _clans(own: Array, run: Run, swarm: Swarm) -> None:

@@ -122,7 +122,8 @@ class Run(Limited):
         return left if fits else max(1, min(left, int(_PORTION / max(self._pace, 1e-9))))
 
     def _evaluated(self, rows: Array, inside: bool) -> Evaluation:
-        began = self._now()
+        timed = self._until < math.inf
+        began = self._now() if timed else 0.0
         if self.pool is None:
             found = self._taken(rows, self._guarded(rows), inside)
         else:
@@ -136,7 +137,8 @@ class Run(Limited):
             if len(parts) < len(rows):
                 self._over(Status.SECONDS)
             found = joined(parts)
-        self._pace = (self._now() - began) / len(rows)
+        if timed:
+            self._pace = (self._now() - began) / len(rows)
         return found
 
     def _taken(self, rows: Array, found: Evaluation, inside: bool) -> Evaluation:
@@ -250,6 +252,9 @@ class Run(Limited):
                 status, said = stop.status, stop.said
             except KeyboardInterrupt:
                 status, said = Status.INTERRUPTED, ""
+            except BaseException:  # sys.exit, say: at least the state is kept
+                self.checkpoint(now=True)
+                raise
         seconds = self.elapsed
         self.checkpoint(now=True)
         x, fun, violation = self.judged()

@@ -25,7 +25,7 @@ _FAR = 1e10  # by which constraints count as broken where they could not be comp
 _FLAT = 1e-6  # slope, a width of the bounds and a unit of cost, that counts as none; chosen
 _NEAR = 1e-7  # by which a constraint may be missed and still holds a search back, chosen
 # Iterations from one of many starts, chosen.
-_OF_MANY = {"SLSQP": 100, "trust-constr": 300, "COBYQA": 300}
+_OF_MANY = {"SLSQP": 100, "L-BFGS-B": 100, "trust-constr": 300, "COBYQA": 300, "Nelder-Mead": 300}
 _FIRST_STEP = 0.1  # of the width: first step of methods without derivatives, chosen
 
 Method = Literal["SLSQP", "L-BFGS-B", "trust-constr", "COBYQA", "Nelder-Mead"]
@@ -34,12 +34,23 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
+def loaded(run: Run) -> Any:
+    """scipy.optimize; the clock and the threads are looked at when all that it takes is there."""
+    import scipy.linalg
+    from scipy import optimize
+
+    assert scipy.linalg
+    run.constructed()
+    return optimize
+
+
 @dataclass(frozen=True)
 class ScipyLocal:
     """A local method of scipy.optimize.minimize, started from x0 (or the middle) and then from
     random points.
 
-    ``starts``: number of starts; later ones are drawn uniformly from the bounds.
+    ``starts``: number of starts; later ones are drawn uniformly from the bounds. COBYQA
+    [ragonneau2024] makes quadratic models without derivatives, with constraints.
     """
 
     needs: ClassVar[frozenset[Capability]] = frozenset()
@@ -64,11 +75,7 @@ class ScipyLocal:
 
     def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         """Search from each start in turn."""
-        import scipy.linalg  # loaded before the clock and the threads are looked at
-        from scipy import optimize
-
-        assert scipy.linalg
-        run.constructed()
+        optimize = loaded(run)
         starts = Starts(run)
         for start in starting_points(run, x0, rng, self.starts):
             unit = (start - run.bounds[:, 0]) / run.width
@@ -143,7 +150,8 @@ class ScipyLocal:
             return optimize.NonlinearConstraint(values, *limits[:, kind], **extra)
 
         equal = limits[0] == limits[1]
-        return {"constraints": [constraint(kind) for kind in (equal, ~equal) if kind.any()]}
+        kept = ~equal & np.isfinite(limits).any(axis=0)  # SciPy fails on those without a limit
+        return {"constraints": [constraint(kind) for kind in (equal, kept) if kind.any()]}
 
     def _settled(self, optimize: Any, run: Run, unit: Array) -> bool:
         """Whether a method that gave up had nothing left to gain: the cost's slope is one of what
@@ -185,11 +193,7 @@ class LeastSquares:
 
     def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         """Search from each start in turn."""
-        import scipy.linalg
-        from scipy import optimize
-
-        assert scipy.linalg
-        run.constructed()
+        optimize = loaded(run)
         objective = cast(ResidualObjective, run.objective)
         gains, (low, high) = objective.residual_gains(), run.bounds.T
         starts = Starts(run)
@@ -223,28 +227,3 @@ class LeastSquares:
             run.propose(result.x)
             starts.ended(bool(result.success), str(result.message))
         return starts.verdict()
-
-
-def slsqp() -> ScipyLocal:
-    """Sequential least-squares programming."""
-    return ScipyLocal("SLSQP")
-
-
-def l_bfgs_b() -> ScipyLocal:
-    """Limited-memory BFGS within bounds."""
-    return ScipyLocal("L-BFGS-B")
-
-
-def trust_constr() -> ScipyLocal:
-    """Trust-region method for constrained problems."""
-    return ScipyLocal("trust-constr")
-
-
-def cobyqa() -> ScipyLocal:
-    """COBYQA [ragonneau2024]: quadratic models without derivatives, with constraints."""
-    return ScipyLocal("COBYQA")
-
-
-def nelder_mead() -> ScipyLocal:
-    """Simplex search within bounds."""
-    return ScipyLocal("Nelder-Mead")

@@ -13,6 +13,7 @@ from trajopt.arrays import Array
 from trajopt.objectives.base import Capability
 from trajopt.optimize.base import Status
 from trajopt.optimize.run import Run
+from trajopt.optimize.scipy import loaded
 
 _LARGE = 1e100  # stands for an infeasible evaluation
 
@@ -50,11 +51,7 @@ class ScipyGlobal:
 
     def search(self, run: Run, x0: Array | None, rng: Generator) -> tuple[Status, str]:
         """Search until the budget ends."""
-        import scipy.linalg
-        from scipy import optimize
-
-        assert scipy.linalg
-        run.constructed()
+        optimize = loaded(run)
 
         def cost(x: Array) -> float:
             return float(min(run.at(x).cost[0], _LARGE))
@@ -73,18 +70,20 @@ class ScipyGlobal:
             )
             run.nit = int(result.nit)
             return _flagged(result), str(result.message[0])
-        if x0 is not None:
-            run.at(x0)
-        return self._divide(optimize, run, cost)
+        return self._divide(optimize, run, x0, cost)
 
     def _divide(
-        self, optimize: Any, run: Run, cost: Callable[[Array], float]
+        self, optimize: Any, run: Run, x0: Array | None, cost: Callable[[Array], float]
     ) -> tuple[Status, str]:
         ended: list[Exception] = []
 
         def kept(x: Array) -> float:  # what is raised must not pass SciPy's C code
             if not ended:
                 try:
+                    if run.nfev == 0:
+                        run.constructed()  # room for all rectangles: 60 ms for a million
+                        if x0 is not None:
+                            run.at(x0)
                     return cost(x)
                 except Exception as stop:
                     ended.append(stop)
@@ -178,18 +177,3 @@ def _flagged(result: Any) -> Status:
 
 def _raise(error: Exception) -> bool:
     raise error
-
-
-def differential_evolution() -> ScipyGlobal:
-    """scipy.optimize.differential_evolution."""
-    return ScipyGlobal("differential-evolution")
-
-
-def dual_annealing() -> ScipyGlobal:
-    """scipy.optimize.dual_annealing."""
-    return ScipyGlobal("dual-annealing")
-
-
-def direct() -> ScipyGlobal:
-    """scipy.optimize.direct."""
-    return ScipyGlobal("direct")

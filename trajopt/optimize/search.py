@@ -20,30 +20,30 @@ from trajopt.optimize.run import Callback, Progress, Run
 from trajopt.optimize.state import StateFile
 from trajopt.optimize.workers import Pool
 
-# name -> module and the class or preset function that makes it with default options
-OPTIMIZERS: dict[str, tuple[str, str]] = {
-    "auto": ("trajopt.optimize.portfolio", "Auto"),
-    "pso": ("trajopt.optimize.pso", "local_best"),
-    "pso-gbest": ("trajopt.optimize.pso", "constriction"),
-    "pso-thesis-first": ("trajopt.optimize.pso", "thesis_first"),
-    "pso-thesis-enhanced": ("trajopt.optimize.pso", "thesis_enhanced"),
-    "pso-ring": ("trajopt.optimize.pso", "ring"),
-    "pso-inertia": ("trajopt.optimize.pso", "falling_inertia"),
-    "lattice": ("trajopt.optimize.lattice", "Lattice"),
-    "newton": ("trajopt.optimize.newton", "Newton"),
-    "ipopt": ("trajopt.optimize.ipopt", "Ipopt"),
-    "ipopt+newton": ("trajopt.optimize.ipopt", "polished"),
-    "lattice+ipopt+newton": ("trajopt.optimize.ipopt", "from_lattice"),
-    "slsqp": ("trajopt.optimize.scipy", "slsqp"),
-    "l-bfgs-b": ("trajopt.optimize.scipy", "l_bfgs_b"),
-    "trust-constr": ("trajopt.optimize.scipy", "trust_constr"),
-    "cobyqa": ("trajopt.optimize.scipy", "cobyqa"),
-    "nelder-mead": ("trajopt.optimize.scipy", "nelder_mead"),
-    "differential-evolution": ("trajopt.optimize.scipy_global", "differential_evolution"),
-    "dual-annealing": ("trajopt.optimize.scipy_global", "dual_annealing"),
-    "direct": ("trajopt.optimize.scipy_global", "direct"),
-    "least-squares": ("trajopt.optimize.scipy", "LeastSquares"),
-    "cma-es": ("trajopt.optimize.cma_es", "CmaEs"),
+# name -> module, class or preset function that makes it, and what that is to be told
+OPTIMIZERS: dict[str, tuple[str, ...]] = {
+    "auto": ("portfolio", "Auto"),
+    "pso": ("pso", "local_best"),
+    "pso-gbest": ("pso", "constriction"),
+    "pso-thesis-first": ("pso", "thesis_first"),
+    "pso-thesis-enhanced": ("pso", "thesis_enhanced"),
+    "pso-ring": ("pso", "ring"),
+    "pso-inertia": ("pso", "falling_inertia"),
+    "lattice": ("lattice", "Lattice"),
+    "newton": ("newton", "Newton"),
+    "ipopt": ("ipopt", "Ipopt"),
+    "ipopt+newton": ("ipopt", "polished"),
+    "lattice+ipopt+newton": ("ipopt", "from_lattice"),
+    "slsqp": ("scipy", "ScipyLocal", "SLSQP"),
+    "l-bfgs-b": ("scipy", "ScipyLocal", "L-BFGS-B"),
+    "trust-constr": ("scipy", "ScipyLocal", "trust-constr"),
+    "cobyqa": ("scipy", "ScipyLocal", "COBYQA"),
+    "nelder-mead": ("scipy", "ScipyLocal", "Nelder-Mead"),
+    "differential-evolution": ("scipy_global", "ScipyGlobal", "differential-evolution"),
+    "dual-annealing": ("scipy_global", "ScipyGlobal", "dual-annealing"),
+    "direct": ("scipy_global", "ScipyGlobal", "direct"),
+    "least-squares": ("scipy", "LeastSquares"),
+    "cma-es": ("cma_es", "CmaEs"),
 }
 
 
@@ -60,8 +60,9 @@ def optimizer_named(name: str) -> Optimizer:
     ``optimize.plugins``). Raises ArgumentError for an unknown name.
     """
     if name in OPTIMIZERS:
-        module, attribute = OPTIMIZERS[name]
-        return checked_optimizer(name, getattr(importlib.import_module(module), attribute)())
+        module, attribute, *told = OPTIMIZERS[name]
+        made = getattr(importlib.import_module(f"trajopt.optimize.{module}"), attribute)
+        return checked_optimizer(name, made(*told))
     file, _, wanted = (
         name.partition(".py:") if ".py:" in name else (name.removesuffix(".py"), "", "")
     )
@@ -148,7 +149,7 @@ def minimize(
         if not getattr(method, "saves", False):
             able = ", ".join(n for n in OPTIMIZERS if getattr(optimizer_named(n), "saves", False))
             raise ArgumentError("state", str(state), f"None for {method.name}: only {able} save")
-        kept = StateFile(state, method, box)
+        kept = StateFile(state, method, asked, box)
     if hasattr(asked, "prepare"):
         asked.prepare()  # compiles, say, before the clock runs
     pool = Pool.of(workers, asked)
@@ -156,7 +157,8 @@ def minimize(
         run = Run(asked, box, budget or Budget(), progress, callback, pool, kept)
         rng = np.random.default_rng(seed)
         note = getattr(asked, "impossible", str)()
-        return run.finish(method.name, lambda: method.search(run, start, rng), note)
+        name = str(optimizer) if optimizer in tuple(OPTIMIZERS) else method.name
+        return run.finish(name, lambda: method.search(run, start, rng), note)
     finally:
         if pool is not None:
             pool.close()

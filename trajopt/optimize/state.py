@@ -16,6 +16,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from trajopt.arrays import Array
 from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
 
@@ -51,13 +52,40 @@ def read_state(path: str | Path, what: str) -> dict[str, Any]:
         raise ArgumentError("path", str(path), f"a file written by {what} ({error})") from None
 
 
+def identity(objective: Any, bounds: Array) -> str:
+    """What tells an objective from others: the name and code of a user's functions, which may be
+    slow; of others the class and the cost in the middle of the bounds."""
+    function = getattr(objective, "function", None)
+    if function is None:
+        try:
+            cost = float(objective.evaluate(bounds.mean(axis=1)[None]).cost[0])
+        except Exception as error:  # whatever an objective raises
+            return f"{type(objective).__name__}, {type(error).__name__} in the middle"
+        return f"{type(objective).__name__}, {cost:.6g} in the middle"
+    functions = [function, *(c.function for c in objective.constraints)]
+    return ", ".join(_named(one) for one in functions)
+
+
+def _named(function: Any) -> str:
+    name = getattr(function, "__qualname__", type(function).__qualname__)
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return str(name)
+    plain = [value for value in code.co_consts if not hasattr(value, "co_code")]
+    return f"{name} ({zlib.crc32(code.co_code + repr((code.co_names, plain)).encode()):08x})"
+
+
 class StateFile:
     """The file of one search: read when it exists, written by ``save``."""
 
-    def __init__(self, path: str | Path, optimizer: Any, bounds: Any) -> None:
+    def __init__(self, path: str | Path, optimizer: Any, objective: Any, bounds: Array) -> None:
         self.path, self._last = Path(path), time.monotonic()
         self.item: Packable | None = None
-        self.about: dict[str, Any] = {"optimizer": repr(optimizer), "bounds": np.asarray(bounds)}
+        self.about: dict[str, Any] = {
+            "optimizer": repr(optimizer),
+            "bounds": np.asarray(bounds),
+            "objective": identity(objective, bounds),
+        }
         self.loaded: dict[str, Any] | None = None
         if self.path.exists():
             self.loaded = read_state(self.path, "a search with state=")

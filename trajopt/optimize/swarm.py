@@ -47,7 +47,7 @@ class SwarmRules:
 class Swarm:
     """Positions ``x``, velocities ``v``, own bests; mutable by nature. ``idle``: iterations since
     it improved; ``used``: share of the budget that is used up, by which the inertia falls where the
-    rules have no horizon."""
+    rules have no horizon; ``seconds``: how long it has searched."""
 
     rules: SwarmRules
     bounds: Array
@@ -61,21 +61,21 @@ class Swarm:
     idle: int = 0
     level: float = FEASIBLE  # violation up to which candidates count as feasible
     used: float = 0.0
+    seconds: float = 0.0
     _reached: tuple[float, float] = (np.inf, np.inf)
 
     def __post_init__(self) -> None:
         i = best_index(self.own_cost, self.own_violation)
         self._reached = float(self.own_cost[i]), float(self.own_violation[i])
-        self._gains = np.array([self.rules.cognitive, self.rules.social])[:, None, None]
-        self._low, self._high = np.ascontiguousarray(self.bounds.T)
-        width = self._high - self._low
+        # One row a particle: loops over whole arrays are quicker than over rows of each.
+        self._low, self._high = np.repeat(self.bounds.T[:, None], len(self.x), axis=1)
+        width = self.bounds[:, 1] - self.bounds[:, 0]
         self._rest = _COLLAPSED * width
         self._limit = width * (
             np.inf if self.rules.velocity_limit is None else self.rules.velocity_limit
         )
         self._kernel = _kernel()
-        self._pulls = np.empty((2, *self.x.shape))
-        self._drawn = np.empty((2, *self.x.shape))
+        self._pull, self._drawn = np.empty(self.x.shape), np.empty((2, *self.x.shape))
         self._leaders = np.zeros(len(self.x), dtype=np.intp)
         self._places, reach = np.arange(len(self.x)), self.rules.neighbours
         around = self._places[:, None] + np.arange(-reach, reach + 1)
@@ -175,6 +175,7 @@ class Swarm:
             "iteration": self.iteration,
             "idle": self.idle,
             "level": self.level,
+            "seconds": self.seconds,
             "rng": self.rng.bit_generator.state,
             **{name: getattr(self, name) for name in _ARRAYS},
         }
@@ -187,7 +188,7 @@ class Swarm:
             getattr(self, name)[:] = kept[name]
         self.rng.bit_generator.state = kept["rng"]
         self.iteration, self.idle = kept["iteration"], kept["idle"]
-        self.level = kept["level"]
+        self.level, self.seconds = kept["level"], kept["seconds"]
         self.__post_init__()
 
     def save(self, path: str | Path) -> None:
@@ -266,42 +267,41 @@ class Swarm:
 
     def _move(self) -> None:
         rules, x, v = self.rules, self.x, self.v
-        r = self.rng.random(out=self._drawn)
-        low, high = self._low, self._high
         if self._kernel is not None:
             if not self._kernel.move(
                 x,
                 v,
                 self.own,
                 self._leaders,
-                r,
+                self.rng.random(out=self._drawn),
                 self._inertia(),
                 rules.cognitive,
                 rules.social,
-                low,
-                high,
+                self._low[0],
+                self._high[0],
                 self._limit,
             ):
                 return  # no coordinate lies outside
         else:
-            self._move_readably(r)
+            self._move_readably()
         if rules.boundary in ("reset", "upper reset", "reflect", "mirror", "absorb"):
-            outside = (x < low) | (x > high)
-            if outside.any():
+            outside = (x < self._low) | (x > self._high)
+            if np.count_nonzero(outside):
                 rows, columns = outside.nonzero()
+                low, high = self._low[0], self._high[0]
                 _bring_back(rules.boundary, x, v, low, high, rows, columns, self.rng)
 
-    def _move_readably(self, r: Array) -> None:
-        x, v, pulls = self.x, self.v, self._pulls
+    def _move_readably(self) -> None:
+        x, v, pull, r = self.x, self.v, self._pull, self._drawn[0]  # few arrays, which stay near
         gbest = self.rules.topology == "gbest"
         leader = self.own[self._leaders[0]] if gbest else self.own[self._leaders]
-        np.subtract(self.own, x, out=pulls[0])
-        np.subtract(leader, x, out=pulls[1])
-        pulls *= self._gains
-        pulls *= r
         v *= self._inertia()
-        v += pulls[0]
-        v += pulls[1]
+        for towards, gain in ((self.own, self.rules.cognitive), (leader, self.rules.social)):
+            np.subtract(towards, x, out=pull)
+            pull *= gain
+            self.rng.random(out=r)
+            pull *= r
+            v += pull
         if self.rules.velocity_limit is not None:
             np.clip(v, -self._limit, self._limit, out=v)
         x += v

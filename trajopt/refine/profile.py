@@ -22,8 +22,9 @@ from trajopt.limits.speed_bound import SpeedProfile
 from trajopt.optimize.symbols import numpy_on_symbols, solve_program, stacked, total, variables
 from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
+from trajopt.timing.profile import excess
 from trajopt.timing.scaling import time_scale
-from trajopt.timing.stages import check, fine_rows, stages_of
+from trajopt.timing.steps import pulls, stages_of, steps
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ground import Ground
 
@@ -111,11 +112,11 @@ def _least_squares(profile: SpeedProfile, limits: tuple[Limit, ...], warm: Traje
     u = np.unique(np.concatenate([path.locate(places), np.asarray(path.basis.knots)]))
     u = u[np.concatenate([[True], np.diff(u) > 1e-9 * (path.end - path.start)])]
     u[-1] = path.end
-    fine = fine_rows(warm.track, u, limits, np.interp(path.parameter(u), warm.s, warm.sd**2))
-    stages = stages_of(fine)
-    step, n = np.diff(fine.s), len(fine.s) - 1
-    first = np.interp(fine.s, warm.s, warm.sd**2)
-    wanted = np.interp(fine.s, profile.places, profile.speeds)
+    s = path.parameter(u)
+    first = np.interp(s, warm.s, warm.sd**2)
+    cells = steps(warm.track, u, limits, first)
+    stages, step, n = stages_of(cells), cells.d, len(cells.d)
+    wanted = np.interp(s, profile.places, profile.speeds)
     bound = np.full(n + 1, np.inf)
     np.minimum.at(bound, np.repeat(np.arange(n + 1), 2)[1:-1], stages.sd2_max)
     x = variables(n + 1)
@@ -145,7 +146,7 @@ def _least_squares(profile: SpeedProfile, limits: tuple[Limit, ...], warm: Traje
             "speed_profile", 0.0, f"IPOPT found no closest motion ({result.status})"
         )
     sd2 = np.maximum(result.x, 0.0)
-    factor = max(1.0, float(check(fine, sd2).factor.max()))
+    factor = float(excess(cells, sd2, *pulls(cells, sd2))[1].max())
     if np.sqrt(factor) > _MOST_SLOWDOWN:
         raise InfeasibleError(
             "speed_profile", 0.0, f"between gridpoints it would have to slow by {factor**0.5:.3g}"
@@ -156,10 +157,10 @@ def _least_squares(profile: SpeedProfile, limits: tuple[Limit, ...], warm: Traje
         limits,
         warm.robot,
         warm.ground,
-        fine.u,
-        fine.s,
+        u,
+        s,
         np.sqrt(sd2),
-        np.diff(sd2) / (2 * step),
+        pulls(cells, sd2)[0],
         "least_squares",
         float(np.sqrt(factor)),
         warm.start_wheels,

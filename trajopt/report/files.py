@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
+
+import numpy as np
 
 from trajopt.errors import ArgumentError
 from trajopt.files import LARGEST_TABLE, content_of, seal, unseal, whole_file
@@ -44,10 +48,13 @@ def write_sealed(file: FilePath, content: dict[str, Any]) -> None:
 
 def write_table(file: FilePath, columns: Mapping[str, Any]) -> None:
     """Write columns of equal length as CSV, every bit of their numbers; NaN is an empty field."""
-    import pandas as pd
-
-    text = pd.DataFrame(dict(columns)).to_csv(index=False, lineterminator="\n")
-    write_text(file, text)
+    lists = [np.asarray(column).tolist() for column in columns.values()]
+    fields = [["" if value != value or value is None else value for value in c] for c in lists]
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(columns)
+    rows.writerows(zip(*fields, strict=True))
+    write_text(file, text.getvalue())
 
 
 def read_sealed(file: FilePath, version: int) -> dict[str, Any]:

@@ -16,9 +16,10 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imsave
 from matplotlib.ticker import FuncFormatter, LogFormatter, NullFormatter
 
-from trajopt.arrays import Array
+from trajopt.arrays import AnyArray, Array
 from trajopt.errors import ArgumentError
 from trajopt.files import whole_file
 from trajopt.report.files import FORMATS
@@ -128,6 +129,9 @@ def _power(value: float, _: int | None) -> str:
     return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
+_PAD = 0.1  # inches of white around what is drawn; chosen
+
+
 def save_figure(figure: Figure, file: FilePath) -> FilePath:
     """Write a picture, PNG, PDF or SVG by its suffix, whole or not at all. Returns ``file``.
 
@@ -137,9 +141,40 @@ def save_figure(figure: Figure, file: FilePath) -> FilePath:
     if kind not in FORMATS:
         raise ArgumentError("file", str(file), "a name that ends in .png, .pdf or .svg")
     plain_powers(figure)
+    picture = _drawn(figure) if kind == "png" else None
     with whole_file(file) as part:
-        figure.savefig(part, format=kind, dpi=RESOLUTION, bbox_inches="tight", pad_inches=0.1)
+        if picture is None:
+            figure.savefig(part, format=kind, dpi=RESOLUTION, bbox_inches="tight", pad_inches=_PAD)
+        else:
+            imsave(part, picture, format=kind, dpi=RESOLUTION)
     return file
+
+
+def _drawn(figure: Figure) -> AnyArray | None:
+    """Pixels (H, W, 4) of what a figure shows with ``_PAD`` around it: drawn once, where ``savefig``
+    draws twice and measures in between. None where something reaches beyond the figure."""
+    figure.dpi = RESOLUTION
+    figure.set_facecolor("white")
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    parts: list[Any] = list(figure.axes)
+    titles = [title for axes in parts for title in (axes.title, axes._left_title)]
+    reach = [title.get_window_extent(canvas.get_renderer()) for title in titles]
+    pixels = np.asarray(canvas.buffer_rgba())
+    inked = np.asarray(np.min(pixels[..., :3], axis=2) < 255)
+    edges = (inked[:2], inked[-2:], inked[:, :2], inked[:, -2:])
+    if (
+        any(edge.any() for edge in edges)
+        or any(box.x1 > figure.bbox.x1 for box in reach)
+        or not inked.any()
+    ):
+        return None
+    rows, columns = np.flatnonzero(inked.any(axis=1)), np.flatnonzero(inked.any(axis=0))
+    pad = round(_PAD * RESOLUTION)
+    high, wide = (
+        slice(max(int(ink[0]) - pad, 0), int(ink[-1]) + 1 + pad) for ink in (rows, columns)
+    )
+    return np.ascontiguousarray(pixels[high, wide])
 
 
 def telling(values: Array, most: int = MOST_LINES) -> list[int]:

@@ -245,7 +245,7 @@ def _rooms(job: _Job, near: Field, path: Path, found: Clearance, more: Array) ->
 
     u = np.arange(1, len(more) + 1) / CELLS
     places, yaw = path.position(u)[:, :2], path.yaw(u)
-    centres = outlines_at(places, yaw, job.discs.centres)
+    centres = outlines_at(places, yaw, job.discs.centres.tolist())
     discs = near.smooth(centres.reshape(-1, 2))[0].reshape(len(u), -1) - job.discs.radii
     own = outline_distances(path, u, job.robot.footprint, job.scene.keep_out)[0]
     lacks = job.clearance - own

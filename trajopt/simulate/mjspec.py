@@ -15,9 +15,9 @@ from trajopt.world.height_map import HeightMap
 # never each other.
 WHEELS, GROUND, OUTLINE, OBSTACLES, NOTHING = (1, 2), (2, 1), (4, 8), (8, 4), (0, 0)
 ROTOR = 1e5  # kg m^2, chosen: no torque of a wheel changes its speed
-# On smooth ground friction is that much stiffer than the contact, chosen: what has to hold creeps by
-# less than 1 mm/s
-FRICTION_IMPEDANCE = 1e4
+# On smooth ground friction is that much stiffer than the contact, chosen. Under soft contacts what has
+# to hold creeps by less than 1 mm/s; with hard rollers the solver would let motors slip (measured).
+FRICTION_IMPEDANCE, HARD_FRICTION_IMPEDANCE = 1e4, 10.0
 NO_FRICTION = 1e-5  # the least that MuJoCo takes
 SHORT = 1e-6  # m, half the length of a sphere as a capsule
 STEERING_RATE = 100.0  # rad/s, natural frequency of a steering servo with its gear; chosen
@@ -55,7 +55,9 @@ class SpecBuilder:
         spec.option.timestep, spec.option.iterations = options.step, options.iterations
         self.smooth, self.uneven = not stage.broken, stage.uneven
         if self.smooth:
-            spec.option.impratio = FRICTION_IMPEDANCE
+            rollers = any(link.joint.role == "roller" for link in model.links)
+            hard = rollers and not self.uneven
+            spec.option.impratio = HARD_FRICTION_IMPEDANCE if hard else FRICTION_IMPEDANCE
         spec.option.gravity = [0.0, 0.0, -STANDARD_GRAVITY]
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
         spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON

@@ -1,66 +1,45 @@
-"""Time-optimal profile by our own reachability analysis, compiled by numba (timing/kernel.py)."""
+"""Time-optimal profile with s'' constant between gridpoints: the passes of the core (timing/reach.py)
+on such cells."""
 
 from __future__ import annotations
-
-from importlib.util import find_spec
 
 import numpy as np
 
 from trajopt.arrays import Array, IndexArray
 from trajopt.errors import ArgumentError
 from trajopt.timing.feasibility import allowed_end, empty_set, require_bounded, require_start_speed
-from trajopt.timing.stages import SD2_CAP, Stages
-
-
-def is_compiled() -> bool:
-    """Whether numba is installed; without it the same functions run interpreted, slowly."""
-    return find_spec("numba") is not None
+from trajopt.timing.stages import SD2_CAP, Stages, controllable
 
 
 def load_kernel() -> None:
-    """Load the compiled passes where numba is installed: about a second, once a process, which a
-    caller that measures its own time may want behind it. They are called on one interval of one
-    metre."""
-    if not is_compiled():
-        return
-    from trajopt.timing import kernel
-
-    s, row, sets = np.array([0.0, 1.0]), np.ones((2, 1)), np.array([[0.0, 1.0], [0.0, 0.0]])
-    kernel.controllable(s, row, row, row, np.ones(2), sets)
-    kernel.fastest(s, row, row, row, sets, 0.0, np.empty(2))
+    """Load the compiled passes: about a second, once a process, which a caller that measures its own
+    time may want behind it. They are called on one interval of one metre."""
+    s, row = np.array([[0.0, 1.0]]), np.ones((1, 2, 1))
+    fastest_profiles(s, row, row, row, np.ones((1, 2)), np.zeros(1), np.zeros(1))
 
 
 def compiled_profile(stages: Stages, start: float, end: float) -> Array:
-    """(G,) s'^2 of the fastest profile with s'^2 = ``start`` and ``end`` at the ends.
+    """(N+1,) s'^2 of the fastest profile with s'^2 = ``start`` and ``end`` at the ends.
 
     Raises InfeasibleError naming limit and place.
     """
-    from trajopt.timing import kernel
-
     end = allowed_end(stages, end)
     sets = controllable_sets(stages, end, end)
     require_start_speed(stages, start, sets)
     require_bounded(stages, sets)
-    sd2 = np.empty(len(stages.s))
-    kernel.fastest(
-        stages.s, stages.a, stages.b, stages.c, sets, min(max(start, sets[0, 0]), sets[0, 1]), sd2
-    )
-    return sd2
+    return _forward(stages.s, stages.a, stages.b, stages.c, sets, start)
 
 
 def controllable_sets(stages: Stages, lowest: float, highest: float) -> Array:
-    """(G, 2) least and greatest s'^2 at each gridpoint from which the end is reached in [lowest,
+    """(N+1, 2) least and greatest s'^2 at each gridpoint from which the end is reached in [lowest,
     highest].
 
     Raises InfeasibleError naming limit and place when a set is empty.
     """
-    from trajopt.timing import kernel
-
-    sets = np.empty((len(stages.s), 2))
-    sets[-1] = lowest, min(highest, float(stages.sd2_max[-1]), SD2_CAP)
-    failed = kernel.controllable(stages.s, stages.a, stages.b, stages.c, stages.sd2_max, sets)
+    last = lowest, min(highest, float(stages.sd2_max[-1]), SD2_CAP)
+    sets, failed = controllable(stages.s, stages.a, stages.b, stages.c, stages.sd2_max, last)
     if failed >= 0:
-        raise empty_set(stages, int(failed), sets)
+        raise empty_set(stages, failed, sets)
     return sets
 
 
@@ -74,8 +53,6 @@ def fastest_profiles(
     gridpoint where that one fails first, -1 for all others. ``Stages`` and ``compiled_profile``
     tell the limit behind it. Raises ArgumentError for shapes that do not fit.
     """
-    from trajopt.timing import kernel
-
     paths, points = np.shape(s)
     for name, values, shape in (
         ("a", a, (paths, points)),
@@ -87,9 +64,29 @@ def fastest_profiles(
     ):
         if np.shape(values)[: len(shape)] != shape:
             raise ArgumentError(name, np.shape(values), f"shape {shape}")
-    sd2, failed = np.empty((paths, points)), np.empty(paths, dtype=np.intp)
-    s, a, b, c, sd2_max, start, end = (
-        np.ascontiguousarray(m, dtype=np.float64) for m in (s, a, b, c, sd2_max, start, end)
-    )
-    kernel.fastest_of_many(s, a, b, c, sd2_max, start, end, sd2, failed)
+    sd2, failed = np.full((paths, points), np.nan), np.full(paths, -1, dtype=np.intp)
+    s, a, b, c = (np.ascontiguousarray(m, dtype=np.float64) for m in (s, a, b, c))
+    for p in range(paths):
+        if end[p] > sd2_max[p, -1] * (1 + 1e-12):
+            failed[p] = points - 1
+            continue
+        sets, failed[p] = controllable(s[p], a[p], b[p], c[p], sd2_max[p], (end[p], end[p]))
+        slack = 1e-9 * sets[0, 1]
+        if failed[p] < 0 and not sets[0, 0] - slack <= start[p] <= sets[0, 1] + slack:
+            failed[p] = 0
+        if failed[p] < 0:
+            sd2[p] = _forward(s[p], a[p], b[p], c[p], sets, start[p])
     return sd2, failed
+
+
+def _forward(s: Array, a: Array, b: Array, c: Array, sets: Array, start: float) -> Array:
+    """The greedy (and optimal) profile inside the controllable sets."""
+    from trajopt.timing import reach
+
+    d = np.diff(s)
+    left = np.flatnonzero(d > 0)
+    top, constant = np.full(len(s), np.inf), np.ones(len(left), dtype=np.bool_)
+    y, u = np.empty(len(left) + 1), np.empty((2, len(left)))
+    first = min(max(start, sets[0, 0]), sets[0, 1])
+    reach.forward(d[left], left, left + 1, left, a, b, c, top, constant, sets, first, y, *u)
+    return y

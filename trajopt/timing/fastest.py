@@ -18,7 +18,7 @@ from trajopt.errors import InfeasibleError
 from trajopt.limits.limit import Limit
 from trajopt.timing.cells import Cells, Measure, Source, cells_of
 from trajopt.timing.curved import Curved
-from trajopt.timing.profile import Profile, between
+from trajopt.timing.profile import Profile, between, excess
 from trajopt.timing.stages import SD2_CAP
 from trajopt.timing.track import Track
 
@@ -193,7 +193,7 @@ def _kept(ask: Ask, cells: Cells) -> tuple[_Solved, float, BoolArray]:
             if cells.table.c.min(initial=1.0) > 0:  # what rest keeps, slowing down keeps
                 break
             y, first, last = (m / worst for m in (solved.y, solved.first, solved.last))
-            left, _ = _excess(cells, y, first, last)
+            left, _ = excess(cells, y, first, last)
             if left.max() <= _KEPT:
                 break
             worst = np.inf
@@ -213,7 +213,7 @@ def _solve(ask: Ask, cells: Cells, tighter: float) -> _Solved:
             if best is None or stuck.unbounded:
                 raise
             break
-        over, factor = _excess(cells, y, u0, u1)
+        over, factor = excess(cells, y, u0, u1)
         solved = _Solved(y, u0, u1, over, factor)
         if best is None or over.max() < best.over.max():
             best = solved
@@ -391,30 +391,6 @@ def _nodes(ask: Ask, cells: Cells, top: Array) -> Array:
         near = np.abs(cells.u[:, None] - ask.stops).min(axis=1)
         node[near <= 1e-12 * (cells.u[-1] - cells.u[0])] = 0.0
     return node
-
-
-def _excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]:
-    """(N,) each: share of a row's scale by which it is broken in every cell, and the factor on y
-    that removes that."""
-    from trajopt.timing import reach
-
-    over, factor = np.empty(len(cells.d)), np.empty(len(cells.d))
-    table = cells.table
-    reach.excess(
-        cells.d,
-        cells.left,
-        cells.right,
-        table.a,
-        table.b,
-        table.c,
-        cells.cap,
-        y,
-        u0,
-        u1,
-        over,
-        factor,
-    )
-    return over, factor
 
 
 def _bound(ask: Ask, cells: Cells, source: Source, profile: Profile) -> tuple[float, Array]:

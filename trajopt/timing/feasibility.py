@@ -6,7 +6,7 @@ import numpy as np
 
 from trajopt.arrays import Array
 from trajopt.errors import InfeasibleError
-from trajopt.timing.stages import SD2_CAP, Stages
+from trajopt.timing.stages import SD2_CAP, Stages, controllable
 
 _SAME = 1e-9  # relative difference of s'^2 that counts as equal
 
@@ -34,13 +34,13 @@ def allowed_end(stages: Stages, end: float) -> float:
 
 
 def empty_set(stages: Stages, failed: int, sets: Array) -> InfeasibleError:
-    """The error for a controllable set that is empty at gridpoint ``failed``, given the sets after
-    it."""
+    """The error for a controllable set that is empty at the place ``failed`` where a cell begins, given
+    the sets (N+1, 2) of the gridpoints after it."""
     place = float(stages.s[failed])
-    low, high = sets[failed + 1]
-    free = np.array([0.0, np.inf])
+    low, high = sets[int(np.sum(np.diff(stages.s[: failed + 1]) > 0)) + 1]
+    free = (0.0, np.inf)
     alone = not _feasible(stages, failed, free, None)
-    after = free if alone else sets[failed + 1]
+    after = free if alone else (low, high)
     cures = [name for k, name in enumerate(stages.names) if _feasible(stages, failed, after, k)]
     broken = stages.c[failed : failed + 2].min(axis=0) < 0
     at_rest = {
@@ -86,19 +86,18 @@ def require_bounded(stages: Stages, sets: Array) -> None:
     if len(loose):
         raise InfeasibleError(
             "none",
-            float(stages.s[loose[0]]),
+            float(stages.s[stages.kept[loose[0]]]),
             "no limit bounds the motion here; add a speed or wheel limit",
         )
 
 
 def require_motion(stages: Stages, sd2: Array) -> None:
-    """Raises InfeasibleError where the profile stands still over an interval."""
-    length = np.diff(stages.s) > 0
-    stuck = np.flatnonzero((sd2[:-1] <= 0) & (sd2[1:] <= 0) & length)
+    """Raises InfeasibleError where the profile (N+1,) stands still over an interval."""
+    stuck = np.flatnonzero((sd2[:-1] <= 0) & (sd2[1:] <= 0))
     if not len(stuck):
         return
-    i = int(stuck[0])
-    free = np.array([0.0, np.inf])
+    i = int(np.flatnonzero(np.diff(stages.s) > 0)[stuck[0]])
+    free = (0.0, np.inf)
     cures = [name for k, name in enumerate(stages.names) if _top(stages, i, free, k) > 0]
     zero = stages.bounds[:, i : i + 2].min(axis=1) <= 0
     limit = (
@@ -128,18 +127,17 @@ def _without(
     return np.ascontiguousarray(stages.s[which]), a, b, c, bound
 
 
-def _top(stages: Stages, i: int, after: Array, dropped: int | None) -> float:
-    """Highest feasible s'^2 at gridpoint i, given the set at i + 1; -1 when there is none."""
-    from trajopt.timing.kernel import controllable
-
+def _top(stages: Stages, i: int, after: tuple[float, float], dropped: int | None) -> float:
+    """Highest feasible s'^2 at place i, given the set at i + 1; -1 when there is none."""
     s, a, b, c, bound = _without(stages, slice(i, i + 2), dropped)
-    sets = np.array([[0.0, 0.0], [after[0], min(after[1], bound[1], SD2_CAP)]])
-    if sets[1, 0] > sets[1, 1] or controllable(s, a, b, c, bound, sets) >= 0:
+    low, high = after[0], min(after[1], bound[1], SD2_CAP)
+    if low > high:
         return -1.0
-    return float(sets[0, 1])
+    sets, failed = controllable(s, a, b, c, bound, (low, high))
+    return -1.0 if failed >= 0 else float(sets[0, 1])
 
 
-def _feasible(stages: Stages, i: int, after: Array, dropped: int | None) -> bool:
+def _feasible(stages: Stages, i: int, after: tuple[float, float], dropped: int | None) -> bool:
     return _top(stages, i, after, dropped) >= 0
 
 
@@ -151,13 +149,10 @@ def _least_slack_at_rest(stages: Stages, i: int) -> str:
 
 def _responsible_for_start(stages: Stages, start: float, end: Array) -> str:
     """The limit without which the start speed would be possible, or would come nearest."""
-    from trajopt.timing.kernel import controllable
-
     distance = np.full(len(stages.names), np.inf)
     for k in range(len(stages.names)):
         s, a, b, c, bound = _without(stages, slice(None), k)
-        sets = np.zeros((len(s), 2))
-        sets[-1] = end
-        if controllable(s, a, b, c, bound, sets) < 0:
+        sets, failed = controllable(s, a, b, c, bound, (end[0], end[1]))
+        if failed < 0:
             distance[k] = max(start - sets[0, 1], sets[0, 0] - start, 0.0)
     return stages.names[int(np.argmin(distance))]

@@ -15,7 +15,6 @@ from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.timing.grid import initial_grid
 from trajopt.timing.job import FASTEST, require_given
-from trajopt.timing.linear import linear_profile
 from trajopt.timing.track import track
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ground import Ground
@@ -44,7 +43,7 @@ def nominal_timing(
     path = along.path
     u = initial_grid(path, None)
     s = path.parameter(u)
-    sd2 = linear_profile(path, u)
+    sd2 = path.rate(u) ** 2  # the spline parameter runs uniformly
     unscaled = float(np.sum(2 * np.diff(s) / (np.sqrt(sd2[:-1]) + np.sqrt(sd2[1:]))))
     sd2 = sd2 * (unscaled / duration) ** 2
     return Trajectory(

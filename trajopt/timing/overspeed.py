@@ -13,7 +13,9 @@ import numpy as np
 from trajopt.arrays import Array
 from trajopt.limits.limit import Limit
 from trajopt.limits.yielding import Yielding
-from trajopt.timing.stages import FineRows, Stages, stages_of
+from trajopt.timing.cells import Cells
+from trajopt.timing.stages import Stages
+from trajopt.timing.steps import stages_of
 
 _KEPT_BACK = (
     1e-3  # share of the possible braking that is not used, for rows between gridpoints; chosen
@@ -22,10 +24,10 @@ _FLAT = 1e-13  # a row (divided by its scale) with a smaller coefficient of s'' 
 _ROUNDING = 1e-9  # relative, on s'^2
 
 
-def yielding(limits: Sequence[Limit], fine: FineRows, start: float) -> tuple[Limit, ...]:
+def yielding(limits: Sequence[Limit], cells: Cells, start: float) -> tuple[Limit, ...]:
     """``limits``, those with a bound below the fastest braking from s'^2 = ``start`` raised to
     it."""
-    stages = stages_of(fine)
+    stages = stages_of(cells)
     squares = _braking(stages, start) * (1 + _ROUNDING)
     stops = int(np.argmin(squares > 0)) if (squares <= 0).any() else len(squares) - 1
     # Each place once: interpolation of a doubled one takes either value, and both are the same.

@@ -36,12 +36,12 @@ def feature(f: Array, t: float, length: float, free: bool, out: Array) -> float:
     else:
         n = np.sqrt(square)
         cross, cross1 = x1 * y2 - y1 * x2, 6 * (x1 * f[3, 1] - y1 * f[3, 0])
-        turn = length * cross / square
-        g = np.sqrt(square + turn * turn)
-        cos, sin = n / g, turn / g
-        bend = length * (cross1 - 3 * cross * along / square) / n / (g * g) / g
-        vx, vy, w = cos, 0.0, sin / length
-        vx1, vy1, w1 = -sin * bend, 0.0, cos * bend / length
+        turn = cross / square
+        g = np.sqrt(square + (length * turn) ** 2)
+        cos, w = n / g, turn / g
+        bend = (cross1 - 3 * cross * along / square) / n / (g * g) / g
+        vx, vy, sin = cos, 0.0, length * w
+        vx1, vy1, w1 = -sin * length * bend, 0.0, cos * bend
         p, p1 = vx, vx1
     out[0], out[1], out[2], out[3] = vx, vy, w, p
     out[4], out[5], out[6], out[7] = vx1, vy1, w1, p1

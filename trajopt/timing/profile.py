@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -73,18 +73,35 @@ class Profile:
 def margins_of(track: Track, profile: Profile, limits: Sequence[Limit]) -> Array:
     """(N, L): least relative margin of every limit in every cell, at its ends (from inside) and
     quarters and where a parabola through these is highest."""
-    from trajopt.timing import reach
-
     source = source_of(track, profile.measure, limits)
     cells = cells_of(track, profile.measure, profile.u, source, profile.u)
-    table, slack = cells.table, np.empty((len(profile.d), len(cells.table.names)))
-    if isinstance(source, Curved):
-        y = between(cells, profile.y, profile.first, profile.last)
-        table = source.tangent(track, profile.measure, cells.spots, table, y)
     motion = profile.y, profile.first, profile.last
+    if isinstance(source, Curved):
+        where = track, profile.measure, cells.spots, cells.table
+        cells = replace(cells, table=source.tangent(*where, between(cells, *motion)))
+    return margins(cells, *motion)
+
+
+def margins(cells: Cells, y: Array, u0: Array, u1: Array) -> Array:
+    """(N, L): as ``margins_of``, by the rows of cells."""
+    from trajopt.timing import reach
+
+    table = cells.table
+    slack = np.empty((len(cells.d), len(table.names)))
     rows = table.a, table.b, table.c, table.bounds, table.owner
-    reach.margins(cells.d, cells.left, cells.right, *rows, *motion, slack)
+    reach.margins(cells.d, cells.left, cells.right, *rows, y, u0, u1, slack)
     return slack
+
+
+def excess(cells: Cells, y: Array, u0: Array, u1: Array) -> tuple[Array, Array]:
+    """(N,) each: share of a row's scale by which it is broken in every cell, and the factor on y
+    that removes that."""
+    from trajopt.timing import reach
+
+    over, factor, table = np.empty(len(cells.d)), np.empty(len(cells.d)), cells.table
+    rows = table.a, table.b, table.c, table.bounds
+    reach.excess(cells.d, cells.left, cells.right, *rows, y, u0, u1, over, factor)
+    return over, factor
 
 
 def between(cells: Cells, y: Array, u0: Array, u1: Array) -> Array:

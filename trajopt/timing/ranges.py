@@ -32,12 +32,13 @@ def u_range(a: Array, b: Array, c: Array, j: int, y: float) -> tuple[float, floa
 @kernel(nogil=True)
 def _pinch(
     a: Array, b: Array, c: Array, j: int, k: int, d: float, low: float, high: float, y: float
-) -> tuple[float, float, float, float, float]:
-    """Gap between the bounds on u at y, its slope, the y where the two meet, and the bounds that flat
-    rows set on y, of place j alone (d = 0) or of a cell from j to k with constant u that ends in
-    [low, high]."""
-    n_up, p_up, q_up, c_up = 0.0, 0.0, 0.0, 0.0
-    n_low, p_low, q_low, c_low = 0.0, 0.0, 0.0, 0.0
+) -> tuple[float, float, float, float, float, int, int]:
+    """Gap between the bounds on u at y, its slope, the y where the two meet, the bounds that flat rows
+    set on y, and the rows that bound u (see ``_row``), of place j alone (d = 0) or of a cell from j to
+    k with constant u that ends in [low, high]."""
+    rows, up, low_one = a.shape[1], -1, -1
+    n_up, p_up, q_up, c_up = np.inf, 1.0, 0.0, 0.0
+    n_low, p_low, q_low, c_low = -np.inf, 1.0, 0.0, 0.0
     ends = 1
     if d > 0:
         n_up, p_up, q_up, c_up = high - y, 2 * d, 1.0, high
@@ -46,24 +47,24 @@ def _pinch(
     y_max, y_min = np.inf, -np.inf
     for end in range(ends):
         i = k if end else j
-        for r in range(a.shape[1]):
+        for r in range(rows):
             q = b[i, r]
             p = a[i, r] + 2 * d * end * q
             n = c[i, r] - q * y
             if p > FLAT:
-                if p_up == 0 or n * p_up < n_up * p:
-                    n_up, p_up, q_up, c_up = n, p, q, c[i, r]
+                if n * p_up < n_up * p:
+                    n_up, p_up, q_up, c_up, up = n, p, q, c[i, r], end * rows + r
             elif p < -FLAT:
-                if p_low == 0 or n * p_low < n_low * p:  # n/p > n_low/p_low with p < 0 < p_low
-                    n_low, p_low, q_low, c_low = -n, -p, -q, -c[i, r]
+                if n * p_low < n_low * p:  # n/p > n_low/p_low with p < 0 < p_low
+                    n_low, p_low, q_low, c_low, low_one = -n, -p, -q, -c[i, r], end * rows + r
             elif q > FLAT:
                 y_max = min(y_max, c[i, r] / q)
             elif q < -FLAT:
                 y_min = max(y_min, c[i, r] / q)
             elif c[i, r] < -_TOUCH:
                 y_max = -np.inf
-    if p_up == 0 or p_low == 0:
-        return np.inf, 0.0, np.nan, y_max, y_min
+    if n_up == np.inf or n_low == -np.inf:
+        return np.inf, 0.0, np.nan, y_max, y_min, up, low_one
     upper, lower = n_up / p_up, n_low / p_low
     gap = upper - lower
     if gap < 0 and gap >= -_TOUCH * (abs(upper) + abs(lower)):
@@ -71,7 +72,7 @@ def _pinch(
     slope = q_low / p_low - q_up / p_up
     # Not y - gap / slope: from far away that leaves no digits where y is small.
     meet = (c_low / p_low - c_up / p_up) / slope if slope != 0 else np.nan
-    return gap, slope, meet, y_max, y_min
+    return gap, slope, meet, y_max, y_min, up, low_one
 
 
 @kernel(nogil=True)
@@ -86,51 +87,80 @@ def end_of_feasible(
     high: float,
     first: float,
     last: float,
-) -> float:
-    """The feasible y nearest to ``first``, going towards ``last``: see ``_pinch``. NaN when there is
-    none between them."""
+) -> tuple[float, int, int]:
+    """The feasible y nearest to ``first``, going towards ``last``, and the rows that bound u there: see
+    ``_pinch``. NaN when there is none between them."""
     down = first >= last
     y = first
     for _ in range(4 * a.shape[1] + 50):
-        gap, slope, step, y_max, y_min = _pinch(a, b, c, j, k, d, low, high, y)
+        gap, slope, step, y_max, y_min, up, lower = _pinch(a, b, c, j, k, d, low, high, y)
         if y_max < y - _TOUCH * abs(y):
             if not down:
-                return np.nan
+                return np.nan, -1, -1
             y = y_max
         elif y_min > y + _TOUCH * abs(y):
             if down:
-                return np.nan
+                return np.nan, -1, -1
             y = y_min
         else:
             if gap >= 0:
-                return y
+                return y, up, lower
             if (slope >= 0) if down else (slope <= 0):
-                return np.nan
-            if step == y:
-                return y
+                return np.nan, -1, -1
+            if (step >= y) if down else (step <= y):  # rounding alone keeps the gap open
+                return y, up, lower
             y = step
         if (y < last) if down else (y > last):
             if abs(y - last) > _TOUCH * max(abs(last), abs(first)):
-                return np.nan
+                return np.nan, -1, -1
             y = last
-    return np.nan
+    return np.nan, -1, -1
 
 
 @kernel(nogil=True)
-def _pair(a: Array, b: Array, c: Array, j: int, y: float) -> tuple[int, int]:
-    """The rows that bound u from above and below at y."""
-    low, high, lower, upper = -np.inf, np.inf, -1, -1
-    for r in range(a.shape[1]):
-        p = a[j, r]
-        if p > FLAT:
-            value = (c[j, r] - b[j, r] * y) / p
-            if value < high:
-                high, upper = value, r
-        elif p < -FLAT:
-            value = (c[j, r] - b[j, r] * y) / p
-            if value > low:
-                low, lower = value, r
-    return lower, upper
+def _row(
+    a: Array, b: Array, c: Array, j: int, k: int, d: float, end: float, which: int
+) -> tuple[float, float, float]:
+    """p, q, c of p u + q y <= c: row ``which``, counted over j and k; -1 is the end ``end`` of the
+    next set."""
+    if which < 0:
+        return 2 * d, 1.0, end
+    rows = a.shape[1]
+    if which < rows:
+        return a[j, which], b[j, which], c[j, which]
+    r = which - rows
+    return a[k, r] + 2 * d * b[k, r], b[k, r], c[k, r]
+
+
+@kernel(nogil=True)
+def meeting(
+    a: Array,
+    b: Array,
+    c: Array,
+    j: int,
+    k: int,
+    d: float,
+    low: float,
+    high: float,
+    up: int,
+    lower: int,
+    cap: float,
+) -> float:
+    """The y above which the rows ``up`` and ``lower`` exclude each other, at most ``cap``: those that
+    met at the place before mostly meet here too."""
+    if up == lower:
+        return cap
+    p_up, q_up, c_up = _row(a, b, c, j, k, d, high, up)
+    p_low, q_low, c_low = _row(a, b, c, j, k, d, low, lower)
+    if lower < 0:
+        p_low, q_low, c_low = -p_low, -q_low, -c_low
+    if p_up > FLAT and p_low < -FLAT:
+        fall = q_up / p_up - q_low / p_low
+        if fall > 0:
+            meet = (c_up / p_up - c_low / p_low) / fall
+            if 0 < meet < cap:
+                return meet
+    return cap
 
 
 @kernel(nogil=True)
@@ -147,27 +177,21 @@ def ceilings(
     """Fills at some places of P top and bottom (P,), the y that the rows there leave, top from at
     most ``cap``, and rests (P,), whether standing still keeps the rows. Returns a place without any
     y, or -1."""
-    lower = upper = -1
+    up = lower = -1
     for j in places:
         rest = True
         for r in range(a.shape[1]):
             rest = rest and c[j, r] >= 0
         rests[j] = rest
-        high = cap[j]
-        if upper >= 0 and lower >= 0:  # the rows that met at the place before mostly meet here too
-            p, q = a[j, upper], a[j, lower]
-            if p > FLAT and q < -FLAT:
-                fall = b[j, upper] / p - b[j, lower] / q
-                if fall > 0:
-                    meet = (c[j, upper] / p - c[j, lower] / q) / fall
-                    if 0 < meet < high:
-                        high = meet
-        top[j] = end_of_feasible(a, b, c, j, j, 0.0, 0.0, 0.0, high, 0.0)
+        high = meeting(a, b, c, j, j, 0.0, 0.0, 0.0, up, lower, cap[j])
+        top[j], one, two = end_of_feasible(a, b, c, j, j, 0.0, 0.0, 0.0, high, 0.0)
         if np.isnan(top[j]):
             return int(j)
         if top[j] < cap[j]:
-            lower, upper = _pair(a, b, c, j, top[j])
-        bottom[j] = 0.0 if rest else end_of_feasible(a, b, c, j, j, 0.0, 0.0, 0.0, 0.0, top[j])
+            up, lower = one, two
+        bottom[j] = 0.0
+        if not rest:
+            bottom[j], _, _ = end_of_feasible(a, b, c, j, j, 0.0, 0.0, 0.0, 0.0, top[j])
         if np.isnan(bottom[j]):
             bottom[j] = top[j]
     return -1

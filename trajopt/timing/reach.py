@@ -18,7 +18,7 @@ import numpy as np
 
 from trajopt.arrays import Array, BoolArray, IndexArray
 from trajopt.kernels import kernel
-from trajopt.timing.ranges import FLAT, end_of_feasible, u_range
+from trajopt.timing.ranges import FLAT, end_of_feasible, meeting, u_range
 
 _NEAR = 1e-3  # of a row's scale: values that far below are no peaks that count; chosen
 
@@ -41,6 +41,7 @@ def backward(
     """Fills sets (N+1, 2), the y from which sets[-1] can be reached; ``node`` (N+1,) is a bound on
     y at gridpoints. Cells that need it become constant. Returns the gridpoint whose set is empty,
     or -1."""
+    up = lower = -1
     for i in range(len(d) - 1, -1, -1):
         j, k, h = left[i], right[i], d[i]
         low, high = sets[i + 1, 0], min(sets[i + 1, 1], top[k])
@@ -81,12 +82,13 @@ def backward(
                 sets[i, 0], sets[i, 1] = below, above
                 continue
             constant[i] = True
-        above = end_of_feasible(a, b, c, j, k, h, low, high, cap, floor)
+        cap = max(meeting(a, b, c, j, k, h, low, high, up, lower, cap), floor)
+        above, up, lower = end_of_feasible(a, b, c, j, k, h, low, high, cap, floor)
         if np.isnan(above):
             return i
         below = floor
         if eased:
-            below = end_of_feasible(a, b, c, j, k, h, low, high, floor, above)
+            below, _, _ = end_of_feasible(a, b, c, j, k, h, low, high, floor, above)
             if np.isnan(below):
                 below = above
         sets[i, 0], sets[i, 1] = below, above
@@ -186,14 +188,14 @@ def excess(
     a: Array,
     b: Array,
     c: Array,
-    cap: Array,
+    bounds: Array,
     y: Array,
     u0: Array,
     u1: Array,
     over: Array,
     factor: Array,
 ) -> None:
-    """Fills over (N,), the share of a row's scale (or of the bound ``cap`` on y) by which each cell
+    """Fills over (N,), the share of a row's scale (or of ``bounds`` (L, P) on y) by which each cell
     breaks it at its ends and quarters, or where a parabola through these is highest, and factor
     (N,), what y would have to be divided by."""
     u, square, values = np.empty(5), np.empty(5), np.empty(5)
@@ -203,11 +205,17 @@ def excess(
         inside(d[i], y[i], y[i + 1], u0[i], u1[i], u, square)
         for k in range(5):
             places[k] = right[i] if k == 4 else left[i] + k
-            here, bound = square[k], cap[places[k]]
-            values[k] = here / bound if bound > 0 else (np.inf if here > 0 else 0.0)
-        ratio = peak(values)
-        if ratio > 1:
-            worst, most = ratio - 1, ratio
+        for n in range(
+            len(bounds)
+        ):  # each alone: their least has kinks, whose peaks no parabola shows
+            near = False
+            for k in range(5):
+                here, bound = square[k], bounds[n, places[k]]
+                values[k] = here / bound if bound > 0 else (np.inf if here > 0 else 0.0)
+                near = near or values[k] > 1 - _NEAR
+            ratio = peak(values) if near else 0.0
+            if ratio > 1:
+                worst, most = max(worst, ratio - 1), max(most, ratio)
         p0, p1, p2, p3, p4 = places[0], places[1], places[2], places[3], places[4]
         for r in range(a.shape[1]):
             v0 = a[p0, r] * u[0] + b[p0, r] * square[0] - c[p0, r]

@@ -24,7 +24,7 @@ from trajopt.timing.grid import graded_grid, initial_grid, insert, placed
 from trajopt.timing.job import Job, checked_job
 from trajopt.timing.overspeed import yielding
 from trajopt.timing.rests import with_rests
-from trajopt.timing.stages import fine_rows
+from trajopt.timing.steps import steps
 from trajopt.timing.trajectory import Trajectory
 from trajopt.world.ground import Ground
 
@@ -58,8 +58,7 @@ def time_scale(
     where the motion varies. The motion is checked inside every cell, and a lower bound on the time of
     any motion that keeps the limits stands beside it: the grid is refined until both are within
     ``gap`` of the duration, if that can be reached (``Trajectory.gap`` tells; None: no bound is made).
-    "bounds" (only where s' and s'' alone are bounded) and "toppra" hold s'' constant between evenly
-    spread gridpoints. Two more are slower motions: "linear" ([waheed2006]: one factor for the whole motion, uniform in the spline
+    "toppra" holds s'' constant between evenly spread gridpoints. Two more are slower motions: "linear" ([waheed2006]: one factor for the whole motion, uniform in the spline
     parameter, with the end speeds that the path gives it, so start and end speed must stay 0) and
     "segments" (below the speed of a factor for each spline segment). ``gridpoints``: how many, or
     path parameters (m); more are added where limits are broken between them. ``stops``: path
@@ -80,7 +79,7 @@ def time_scale(
     0.01 or 0.1 % tighter instead.
 
     Raises ArgumentError for bad arguments, InfeasibleError (limit and place) where no motion
-    exists, and MissingDependencyError for "compiled" without numba.
+    exists.
     """
     speeds, start = (start_speed, end_speed), (start_wheels, start_steering)
     job = checked_job(path, limits, robot, ground, speeds, engine, stops, start)
@@ -98,7 +97,7 @@ def time_scale(
     raised: tuple[Limit, ...] = job.limits
     if too_fast == "brake" and start_speed > 0:
         square = job.squares[0]
-        rows = fine_rows(job.track, u, job.limits, np.full(len(u), square))
+        rows = steps(job.track, u, job.limits, np.full(len(u), square))
         raised = yielding(job.limits, rows, square)
     places = u if raised != job.limits else u[:0]
     job = replace(job, limits=raised)

@@ -12,26 +12,26 @@ from __future__ import annotations
 import numpy as np
 
 from trajopt.arrays import Array
-from trajopt.paths.path import Path
-from trajopt.timing.stages import FineRows, check
+from trajopt.timing.cells import Cells
+from trajopt.timing.steps import used
 
 
-def segment_factors(path: Path, fine: FineRows) -> Array:
+def segment_factors(cells: Cells) -> Array:
     """(K-1,): factor on the time of each segment, whose nominal time is its span of spline
     parameter (s).
 
     0 where nothing bounds the motion of a segment. The thesis's duration is factors @ diff(knots).
     """
-    worst = check(fine, path.rate(fine.u) ** 2).factor
-    first = np.searchsorted(fine.u, np.asarray(path.basis.knots[:-1]))
+    worst = used(cells, cells.path.rate(cells.u) ** 2)
+    first = np.searchsorted(cells.u, np.asarray(cells.path.basis.knots[:-1]))
     return np.asarray(np.sqrt(np.maximum.reduceat(worst, first)))
 
 
-def segment_ceiling(path: Path, fine: FineRows) -> Array:
+def segment_ceiling(cells: Cells) -> Array:
     """(2 N,) s'^2 at both ends of every interval when every segment runs with its own factor."""
-    factors = segment_factors(path, fine)
-    middle = (fine.u[:-1] + fine.u[1:]) / 2
+    u, path, factors = cells.u, cells.path, segment_factors(cells)
+    middle = (u[:-1] + u[1:]) / 2
     mine = factors[np.searchsorted(np.asarray(path.basis.knots), middle) - 1]
     with np.errstate(divide="ignore"):
-        rate2 = np.repeat(path.rate(fine.u) ** 2, 2)[1:-1]
+        rate2 = np.repeat(path.rate(u) ** 2, 2)[1:-1]
         return np.asarray(rate2 / np.repeat(mine, 2) ** 2)

@@ -10,8 +10,10 @@ import numpy as np
 
 from trajopt.arrays import Array, BoolArray, require_between, require_choice
 from trajopt.errors import ArgumentError
-from trajopt.timing.engines import ENGINES, pick_engine
-from trajopt.timing.stages import Stages, fine_rows, stages_of
+from trajopt.timing.compiled import compiled_profile
+from trajopt.timing.engines import ENGINES
+from trajopt.timing.stages import Stages
+from trajopt.timing.steps import stages_of, steps
 from trajopt.timing.trajectory import Trajectory
 
 
@@ -28,8 +30,8 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError("trajectory", trajectory, "a Trajectory, as time_scale gives it")
     require_choice("trajectory.engine", trajectory.engine, ENGINES)
-    fine = fine_rows(trajectory.track, trajectory.u, trajectory.limits, trajectory.sd**2)
-    stages = stages_of(fine)
+    cells = steps(trajectory.track, trajectory.u, trajectory.limits, trajectory.sd**2)
+    stages = stages_of(cells)
     stopped = np.repeat(trajectory.sd <= 0, 2)[1:-1]
     stopped[[0, -1]] = False
     ends = (trajectory.sd[[0, -1]] * trajectory.slowdown) ** 2
@@ -47,6 +49,5 @@ def sensitivities(trajectory: Trajectory, change: float = 0.01) -> Mapping[str, 
 def _duration(stages: Stages, stopped: BoolArray, ends: Array) -> float:
     stages = replace(stages, sd2_max=np.where(stopped, 0.0, stages.sd2_max))
     # A start speed on its limit is above it by rounding; the engine allows for that.
-    profile = ENGINES[pick_engine("auto", stages)](stages, float(ends[0]), float(ends[1]))
-    sd = np.sqrt(profile[stages.kept])
+    sd = np.sqrt(compiled_profile(stages, float(ends[0]), float(ends[1])))
     return float(np.sum(2 * np.diff(stages.s[stages.kept]) / (sd[:-1] + sd[1:])))

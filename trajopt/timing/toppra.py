@@ -16,7 +16,7 @@ from trajopt.timing.stages import SD2_CAP, Stages
 
 
 def toppra_profile(stages: Stages, start: float, end: float) -> Array:
-    """(G,) s'^2 of the fastest profile with s'^2 = ``start`` and ``end`` at the ends.
+    """(N+1,) s'^2 of the fastest profile with s'^2 = ``start`` and ``end`` at the ends.
 
     The rows are handed over already in interpolation form, with the left and right limits of a knot
     kept apart, so toppra's own discretisation switch (which custom constraints ignore silently) is
@@ -24,16 +24,15 @@ def toppra_profile(stages: Stages, start: float, end: float) -> Array:
     """
     end = allowed_end(stages, end)
     kept = stages.kept
-    group = np.cumsum(np.concatenate([[False], np.diff(stages.s) > 0]))
     grid = stages.s[kept]
     instance = _instance(stages, kept, grid)
     _, speed, _, raw = instance.compute_parameterization(
         np.sqrt(start), np.sqrt(end), return_data=True
     )
-    sets = np.asarray(raw, dtype=np.float64)[group]
+    sets = np.asarray(raw, dtype=np.float64)
     bad = np.flatnonzero(np.isnan(sets).any(axis=1))
     if len(bad):
-        raise empty_set(stages, int(bad[-1]), sets)
+        raise empty_set(stages, int(np.flatnonzero(np.diff(stages.s) > 0)[bad[-1]]), sets)
     require_start_speed(stages, start, sets)
     require_bounded(stages, sets)
     if speed is None or not np.all(np.isfinite(speed)):
@@ -41,7 +40,7 @@ def toppra_profile(stages: Stages, start: float, end: float) -> Array:
         raise InfeasibleError(
             "toppra", place, "its solver failed numerically; use engine='compiled'"
         )
-    return np.asarray(np.asarray(speed, dtype=np.float64)[group] ** 2)
+    return np.asarray(speed, dtype=np.float64) ** 2
 
 
 def _instance(stages: Stages, kept: IndexArray, grid: Array) -> Any:

@@ -18,10 +18,10 @@ from trajopt.paths.path import Path
 from trajopt.robots.robot import Robot
 from trajopt.shown import Shown
 from trajopt.timing.energy import energies
-from trajopt.timing.profile import Profile, margins_of
+from trajopt.timing.profile import Profile, margins, margins_of
 from trajopt.timing.rests import Rest, rests_of
-from trajopt.timing.stages import check, fine_rows
 from trajopt.timing.states import Course, State, states_at
+from trajopt.timing.steps import pulls, steps
 from trajopt.timing.track import Track
 from trajopt.world.ground import Ground
 
@@ -205,7 +205,7 @@ class Trajectory(Shown):
 
     def margins(self) -> Mapping[str, float]:
         """Least relative margin of every limit, recomputed at the ends and quarters of the cells,
-        which are small where the motion varies (or on a grid ten times finer than the solver's)."""
+        which are small where the motion varies, and where a parabola through these is highest."""
         least = self._slack.min(axis=0)
         return MappingProxyType(
             {limit.name: float(m) for limit, m in zip(self.limits, least, strict=True)}
@@ -240,7 +240,8 @@ class Trajectory(Shown):
         """(N, L): least relative margin of every limit in each interval."""
         if self.profile is not None:
             return margins_of(self.track, self.profile, self.limits)
-        return check(fine_rows(self.track, self.u, self.limits, self.sd**2), self.sd**2).slack
+        cells = steps(self.track, self.u, self.limits, self.sd**2)
+        return margins(cells, self.sd**2, *pulls(cells, self.sd**2))
 
     @cached_property
     def track(self) -> Track:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trajopt.arrays import Array, require_positive
-from trajopt.limits.limit import Rows, linear_rows, speed_rows
+from trajopt.limits.limit import Limit, Rows, linear_rows, speed_rows
 from trajopt.paths.samples import PathSamples
 from trajopt.robots.robot import Robot
 
@@ -48,7 +48,7 @@ def thesis_slide_speed(curvature: Array, friction: float) -> float:
 
 
 @dataclass(frozen=True)
-class ThesisSlip:
+class ThesisSlip(Limit):
     """|s''| <= eq. 2.20 at the place's slope, accelerating and braking alike (eqs. 2.20, 2.21)."""
 
     friction: float  # dimensionless
@@ -62,7 +62,7 @@ class ThesisSlip:
 
 
 @dataclass(frozen=True)
-class ThesisTip:
+class ThesisTip(Limit):
     """|s''| <= eq. 2.24 at the place's slope, accelerating and braking alike (eqs. 2.24, 2.25)."""
 
     name: str = "thesis_tip"
@@ -72,7 +72,7 @@ class ThesisTip:
 
 
 @dataclass(frozen=True)
-class ThesisSlide:
+class ThesisSlide(Limit):
     """s' <= sqrt(mu g rho) with the smallest radius rho of the whole path (eq. 2.15).
 
     ``largest_curvature`` (1/m) is that of the whole path, as rows only see gridpoints.
