@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from trajopt.arrays import Array, rotation
 from trajopt.paths.path import Path
@@ -100,7 +101,7 @@ def crossings(
     return tuple(found)
 
 
-def outlines_at(places: Array, yaw: Array, footprint: Sequence[tuple[float, float]]) -> Array:
+def outlines_at(places: Array, yaw: Array, footprint: ArrayLike) -> Array:
     """(N, K, 2): corners of an outline at places (N, 2) and yaws (N,)."""
     turned = np.asarray(footprint, dtype=np.float64) @ np.swapaxes(rotation(yaw), -1, -2)
     return np.asarray(turned + places[:, None, :])
