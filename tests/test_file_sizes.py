@@ -18,6 +18,7 @@ LONGER = {
     "trajopt/optimize/swarm.py": "one compiled kernel and its readable twin, side by side",
     "trajopt/robots/robot.py": "a robot, and all that follows from its file alone",
     "trajopt/simulate/pybullet.py": "the one file that calls pybullet to build and step",
+    "trajopt/timing/reach.py": "passes, check and times, kernels of one kind of cell",
     "trajopt/timing/fastest.py": "the core, from rows on a grid to a motion and its bound",
     "trajopt/report/run_folder.py": "writing and reading a run folder, kept in step",
 }
