@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from decimal import Decimal
 from fractions import Fraction
@@ -15,6 +16,12 @@ from trajopt.errors import ArgumentError
 from trajopt.objectives.base import Capability
 from trajopt.optimize.base import Budget, Status
 from trajopt.optimize.search import minimize, optimizer_named, optimizer_names
+
+
+def told(value: object) -> str:
+    """Without addresses: all workers of a test run must name a test alike."""
+    return re.sub(r" at 0x\w+", "", repr(value))
+
 
 Array = NDArray[np.float64]
 
@@ -36,7 +43,7 @@ NUMBERS = [True, np.True_, 3, np.float32(2), np.array(1.5), np.array([[1.5]]), [
 NUMBERS += [Decimal("1.5"), Fraction(3, 2), 1e308, -1e308]
 
 
-@pytest.mark.parametrize("answer", NUMBERS, ids=repr)
+@pytest.mark.parametrize("answer", NUMBERS, ids=told)
 @pytest.mark.parametrize("name", ["pso", "slsqp"])
 def test_every_kind_of_number_is_a_cost(answer: Any, name: str) -> None:
     with warnings.catch_warnings():
@@ -58,7 +65,7 @@ def test_every_kind_of_number_is_a_cost(answer: Any, name: str) -> None:
         ValueError("x"),
         np.datetime64("NaT"),
     ],
-    ids=repr,
+    ids=told,
 )
 def test_what_is_no_number_is_none(answer: Any) -> None:
     found = minimize(lambda _: answer, BOX, optimizer="pso", budget=Budget(60))
@@ -97,7 +104,7 @@ def test_whatever_an_objective_raises_is_survived(error: type[Exception], name: 
         [-2.0, 3.0],
         "auto",
     ],
-    ids=repr,
+    ids=told,
 )
 def test_bounds_that_hold_nothing_are_refused(bounds: Any) -> None:
     with pytest.raises(ArgumentError, match="bounds"):
@@ -128,7 +135,7 @@ def test_starts_at_corners(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "x0", [[1.0], [[1.0, 1.0]], 1.0, "11", [1j, 1], [None, 1], [np.nan, 1.0], [9.0, 0.0]], ids=repr
+    "x0", [[1.0], [[1.0, 1.0]], 1.0, "11", [1j, 1], [None, 1], [np.nan, 1.0], [9.0, 0.0]], ids=told
 )
 def test_starts_that_are_none_are_refused(x0: Any) -> None:
     with pytest.raises(ArgumentError, match="x0"):
@@ -142,19 +149,19 @@ def shifted(x: Array, a: float, b: float = 1.0) -> float:
     return float(((x - a) ** 2).sum()) * b
 
 
-@pytest.mark.parametrize("args", [(1.0,), [1.0, 2.0], np.array([1.0])], ids=repr)
+@pytest.mark.parametrize("args", [(1.0,), [1.0, 2.0], np.array([1.0])], ids=told)
 def test_args_are_a_sequence(args: Any) -> None:
     found = minimize(shifted, BOX, args=args, optimizer="slsqp", budget=Budget(200))
     assert found.fun < 1e-9
 
 
-@pytest.mark.parametrize("args", [1.0, "a", {"a": 1}, None], ids=repr)
+@pytest.mark.parametrize("args", [1.0, "a", {"a": 1}, None], ids=told)
 def test_args_that_are_none_are_refused(args: Any) -> None:
     with pytest.raises(ArgumentError, match="args"):
         minimize(shifted, BOX, args=args)
 
 
-@pytest.mark.parametrize("seed", [True, None, 1.0, -1, "3", np.random.default_rng(0)], ids=repr)
+@pytest.mark.parametrize("seed", [True, None, 1.0, -1, "3", np.random.default_rng(0)], ids=told)
 def test_seeds_are_whole_numbers(seed: Any) -> None:
     with pytest.raises(ArgumentError, match="seed"):
         minimize(square, BOX, seed=seed)
