@@ -172,3 +172,15 @@ def test_engines_agree_through_time_scale():
         assert best.duration <= theirs.duration * (1 + 1e-4)
         assert theirs.duration == pytest.approx(best.duration, rel=2e-3)
         assert theirs.duration >= best.bound * (1 - 5e-5)
+
+
+def test_gridpoints_may_stand_at_one_place():
+    """As where a curvature jumps: both have the same speed."""
+    s = np.array([[0.0, 0.5, 0.5, 1.0]])
+    rows = np.broadcast_to(np.array([1.0, -1.0]), (1, 4, 2))
+    zero, one = np.zeros((1, 4, 2)), np.ones((1, 4, 2))
+    sd2, failed = fastest_profiles(
+        s, rows, zero, one, np.full((1, 4), 10.0), np.zeros(1), np.zeros(1)
+    )
+    assert failed[0] == -1
+    np.testing.assert_allclose(sd2[0], [0.0, 1.0, 1.0, 0.0], atol=1e-9)

@@ -75,7 +75,8 @@ def fastest_profiles(
         if failed[p] < 0 and not sets[0, 0] - slack <= start[p] <= sets[0, 1] + slack:
             failed[p] = 0
         if failed[p] < 0:
-            sd2[p] = _forward(s[p], a[p], b[p], c[p], sets, start[p])
+            node = np.append(0, np.cumsum(np.diff(s[p]) > 0))  # gridpoints may stand at one place
+            sd2[p] = _forward(s[p], a[p], b[p], c[p], sets, start[p])[node]
     return sd2, failed
 
 

@@ -172,7 +172,7 @@ def test_ramp_keeps_the_curve_in_the_plane() -> None:
     [
         ({"path": {"start_rate": -1.0}}, "start_rate"),
         ({"path": {"points": [[0, 0], [0, 0]]}}, "points"),
-        ({"path": {"points": None}}, "points or file"),
+        ({"path": {"points": None}}, "points, file, segments or pieces"),
         ({"path": {"headings": [0.0] * 5}}, "heading"),
         ({"path": {"heading": "free", "headings": [0.0] * 5}}, "cannot move in every direction"),
         ({"path": {"closed": True}}, "path.closed"),
