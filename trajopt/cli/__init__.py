@@ -4,7 +4,6 @@ input, 130 where Ctrl-C or SIGTERM ended it."""
 from __future__ import annotations
 
 import importlib
-import logging
 import sys
 import traceback
 from typing import Annotated
@@ -13,7 +12,7 @@ import typer
 
 import trajopt
 from trajopt.cli import bench, examples, paths, robot, search, sweep, view
-from trajopt.cli.shared import INTERRUPTED, leaving, switched
+from trajopt.cli.shared import INTERRUPTED, console, leaving, switched
 from trajopt.errors import TrajoptError
 
 app = typer.Typer(
@@ -69,7 +68,7 @@ def main() -> None:
     except (TrajoptError, OSError) as error:
         from trajopt.report.console import PlainConsole
 
-        if logging.getLogger().isEnabledFor(logging.INFO):  # --verbose
+        if console.verbose:
             traceback.print_exc()
         PlainConsole(stderr=True, soft_wrap=True).print(f"error: {error}")
         sys.exit(UNUSABLE)

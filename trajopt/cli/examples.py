@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from trajopt.cli.shared import console, simple_table
+from trajopt.cli.shared import Force, console, simple_table
 from trajopt.errors import ArgumentError
 from trajopt.report.words import words
 
@@ -29,7 +29,7 @@ def examples(
     out: Annotated[
         Path | None, typer.Option("--out", help="copy all of them into this folder")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="write over what is there")] = False,
+    force: Force = False,
 ) -> None:
     """List the problems and scripts that come along, or copy them."""
     root = shipped()

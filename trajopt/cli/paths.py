@@ -41,7 +41,7 @@ def explain(
         )
     )
     if facts["why_gap"]:
-        console.print(f"above the least time: {facts['why_gap']}")
+        console.print(f"no nearer proof of the least time: {facts['why_gap']}", soft_wrap=True)
     stretches = _table("from s (m)", "to s (m)", "limit that binds")
     for part in facts["stretches"]:
         stretches.add_row(f"{part['from_m']:.3f}", f"{part['to_m']:.3f}", part["limit"])

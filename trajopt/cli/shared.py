@@ -29,7 +29,7 @@ class _Output:
     """Standard output: tables and lines, or with ``--json`` facts alone, or with ``--quiet``
     nothing. rich is loaded when something is printed: it takes as long as a short command."""
 
-    lines, as_json = True, False
+    lines, as_json, verbose = True, False, False
 
     def print(self, *parts: Any, **options: Any) -> None:
         if not self.lines:
@@ -70,12 +70,14 @@ def switched(command: Callable[..., None], *, tells: bool = False) -> Callable[.
         asked = {name: given.pop(name) for name in names}
         console.as_json = bool(asked.get("as_json"))
         console.lines = not (asked["quiet"] or console.as_json)
-        if asked["verbose"]:
+        console.verbose = asked["verbose"]
+        if console.verbose:
             logging.basicConfig(level=logging.INFO, format="%(message)s")
         elif console.lines and sys.stderr.isatty():
             told = logging.getLogger("trajopt.kernels")  # that it compiles, which takes long
             told.setLevel(logging.INFO)
-            told.addHandler(logging.StreamHandler())
+            if not told.handlers:  # a process may run several commands
+                told.addHandler(logging.StreamHandler())
         command(**given)
 
     hints = get_type_hints(command, include_extras=True)
@@ -88,6 +90,7 @@ def switched(command: Callable[..., None], *, tells: bool = False) -> Callable[.
         inspect.Parameter(name, kind, default=False, annotation=Annotated[bool, _SWITCHES[name]])
         for name in names
     ]
+    # typer reads what a command takes from its signature
     run.__signature__ = inspect.Signature([*own, *more])  # type: ignore[attr-defined]
     run.__annotations__ = {one.name: one.annotation for one in [*own, *more]}
     return run
